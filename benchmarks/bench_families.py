@@ -36,7 +36,7 @@ from terragrip.simulation.families import Kind
 
 Floats = NDArray[np.float64]
 
-PARTS = ("development", "rigid", "held-out", "second-plant")
+PARTS = ("development", "rigid", "rolling", "held-out", "second-plant")
 RATES = (100.0, 50.0, 20.0, 10.0)
 MOVING = 0.05  # m/s, or a tenth of the usual speed where that is less
 LAGS = 40  # samples either way
@@ -117,11 +117,11 @@ def main() -> None:
 
 
 def machines_of(part: str, count: int, seed: int) -> Iterator[tuple[Kind, int]]:
-    """``count`` machines of one of PARTS, of which rigid is for development, too."""
+    """``count`` machines of one of PARTS, of which rigid and rolling are for development, too."""
     if part == "second-plant":
         return second.machines(count, seed)
-    if part == "rigid":
-        return families.machines("development", count, seed, "rigid")
+    if part in ("rigid", "rolling"):
+        return families.machines("development", count, seed, "rigid" if part == "rigid" else "rolling")
     return families.machines("held-out" if part == "held-out" else "development", count, seed)
 
 

@@ -347,7 +347,8 @@ typedef struct {
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
     tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
     tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is low-passed */
-    tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be more */
+    tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be at most */
+    tg_real lasting_share;          /* of what lasts beyond all trends: how likely it is adhesion, and not load */
     tg_real soil_spread;            /* relative SD of the resistance of a field's soil: what it does beyond that may be slope, where nothing tells the slope; */
     tg_real hill_memory;            /* wheel radii over which its mean and its SD are taken for that, at most */
 } tg_tuned;

@@ -71,14 +71,16 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
 }
 
+/* A mean square of adhesions over that of the wheels' own. */
+tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
+
 /* Relative variance of a wheel's load that the loads of the model do not hold. Of a load that is alike over TG_LOAD_LENGTH the low-pass
  * leaves length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
-    const tgi_roughness *r = &e->roughness;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length;
-    return whole * r->scatter / (r->square + TG_SMALL_ADHESION) + tgi_square(k->least_load_spread);
+    return whole * tgi_relative(e, e->roughness.scatter) + tgi_square(k->least_load_spread);
 }
 
 /* Variance of the slope that rho_s may hold where nothing tells the slope: thrust goes into hills and soft soil alike. What rho_s does

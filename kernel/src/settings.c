@@ -68,7 +68,8 @@ static tg_tuned default_tuned(void)
     k.least_load_spread = (tg_real)0.02;
     k.slip_length = (tg_real)0.25;
     k.bend = (tg_real)0.5;
-    k.bend_spread = (tg_real)0.6;
+    k.bend_spread = (tg_real)0.9;
+    k.lasting_share = (tg_real)0.5;
     k.soil_spread = (tg_real)0.2;
     k.hill_memory = 1000;
     return k;

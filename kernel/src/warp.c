@@ -1,7 +1,7 @@
 /* What a stiff chassis shifts between wheels (R; docs/decisions/0144). Loads that ground unevenness moves from wheel to wheel keep their sum and
  * both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one diagonal
  * against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by side, hardly by
- * diagonal; so of that pattern only what lasts longer than unevenness does is taken for adhesion.
+ * diagonal; so of that pattern only what lasts longer than unevenness does may be adhesion, or a load that hills shift (docs/decisions/0154).
  * Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along the curve, is true adhesion.
  * Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds are, and what they make is known. */
 #include "estimator.h"
@@ -9,6 +9,7 @@
 #define TG_TRENDS 3 /* alike, along, across */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
 #define TG_LEAST_SLIP ((tg_real)0.02) /* below it the secant of the curve is not known */
+#define TG_SMALL_SLIP ((tg_real)4e-6) /* .002 squared: a noise below it is small */
 
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends leave patterns. */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
@@ -91,17 +92,18 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real fresh, tg_re
         return;
     }
     tgi_warp(c, slip, warp);
-    const tg_real noise = variance * (tg_real)c->warps * c->share;
+    const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + TG_SMALL_SLIP);
+    const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row tells less than usual */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
-        w->usual[i] += gain * beyond;
-        w->slip[i] += soon * (beyond - w->slip[i]);
+        w->usual[i] += weight * gain * beyond;
+        w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
         pull += c->at_rest[i] * e->belief.x[i];
         mean += c->at_rest[i] * slip[i];
     }
-    w->square += gain * (square * c->share - w->square);
-    w->noise += gain * (noise - w->noise);
+    w->square += weight * gain * (square * c->share - w->square);
+    w->noise += weight * gain * (noise - w->noise);
     w->pulling += fresh * (pull - w->pulling);
     w->slipping += fresh * (mean - w->slipping);
 }
@@ -117,13 +119,18 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
     else memset(w->slip, 0, sizeof w->slip);
 }
 
-/* What of the adhesions beyond the trends is no load (n,): what lasts, and what slips tell. Returns the relative variance of what slips tell more. */
+/* What of the adhesions beyond the trends is no load (n,): of what lasts, a share, for a rut does that and a hill; and what slips tell.
+ * Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was told already. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, TG_LEAST_SLIP);
-    const tg_real slope = w->square > 0 ? k->bend * tgi_max(w->pulling, 0) * inverse * excess / w->square : 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) warp[i] = w->adhesion[i] + slope * w->slip[i];
-    return tgi_square(k->bend_spread * inverse) * excess;
+    const tg_real told = w->square > 0 ? k->bend * excess / w->square : 0, slope = told * tgi_max(w->pulling, 0) * inverse;
+    tg_real lasting = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
+        lasting += tgi_square(w->adhesion[i]) * e->constants.share;
+    }
+    return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square((k->bend_spread - told) * inverse) * excess;
 }

@@ -7,6 +7,9 @@ import pytest
 
 from terragrip.physics.loads import axle_loads, lateral_shares
 from terragrip.simulation.family_machines import LAYOUTS
+from terragrip.simulation.fields import Field, stream
+from terragrip.simulation.terrain import build
+from terragrip.units import STANDARD_GRAVITY
 
 
 @pytest.mark.parametrize("counts", [counts for _, counts in LAYOUTS], ids=str)
@@ -76,3 +79,37 @@ def moving(counts, quiet, *, route=CLIMB, duration=8):
         duration=duration,
         sensors={"use": "exact", "wheel_force": None},
     )
+
+
+@pytest.mark.parametrize("counts", [counts for _, counts in LAYOUTS if sum(counts) > 2], ids=str)
+def test_hills_shift_loads_as_a_stiff_plate_on_springs_has_them(counts, quiet):
+    """Sum and both moments stay; of the heights' part that is no plane each spring has its share; three wheels find a plane."""
+    hilly = {
+        "segments": [{"soil": "even", "length": 60}],
+        "slope": {"sd": 0.05, "length": 4.0, "twists": True},
+    }
+    scenario = moving(counts, quiet, route=hilly)
+    scenario = scenario.model_copy(
+        update={"robot": scenario.robot.model_copy(update={"chassis_torsion": 1e6, "tire_stiffness": 4e3})}
+    )
+    vehicle = scenario.nominal_vehicle()
+    ground = build(scenario, vehicle, seed=3)
+    x, axle, sides = ground.path.x, vehicle.wheel_axle, vehicle.wheel_side
+    ahead = vehicle.axle_to_rear[axle]
+    middle = len(x) // 2
+    places = [np.interp(x[middle] + a, x, np.arange(len(x))) for a in ahead]
+    at_rest = STANDARD_GRAVITY * (vehicle.axle_mass / np.bincount(axle))[axle]
+    relative = [
+        np.interp(p, np.arange(len(x)), one) for p, one in zip(places, ground.load_variation, strict=True)
+    ]
+    force = np.array(relative) * at_rest
+    plane = np.stack([np.ones(len(ahead)), ahead, sides], axis=1)
+    np.testing.assert_allclose(force @ plane, 0, atol=1e-6 * at_rest.sum())
+    hills = Field(stream(3, "slope"), 4.0, smooth=True)
+    height = [
+        0.05 * 4.0 * hills.at(*(np.interp([p], np.arange(len(x)), e) for e in ground.path.beside(y)))[0]
+        for p, y in zip(places, sides, strict=True)
+    ]
+    fit = plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+    np.testing.assert_allclose(force, 4e3 * (height - fit), rtol=2e-2, atol=1e-2)
+    assert (np.abs(force).max() > 1) == (len(ahead) > 3)

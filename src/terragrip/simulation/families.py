@@ -26,8 +26,9 @@ from terragrip.units import STANDARD_GRAVITY
 Tree = dict[str, Any]
 Part = Literal["development", "held-out"]
 Task = Literal["work", "healthy", "digging"]
-Chassis = Literal["sprung", "rigid"]
-"""rigid: three to eight wheels on a chassis that hardly warps, over ground so uneven that much of a wheel's load goes to the others."""
+Chassis = Literal["sprung", "rigid", "rolling"]
+"""rigid: three to eight wheels on a chassis that hardly warps, over ground so uneven that much of a wheel's load goes to the others.
+rolling: the same over hills that twist and bend under the wheels, which shifts loads for as long as a hill is (docs/decisions/0154)."""
 
 MASSES: dict[str, tuple[float, float]] = {
     "light": (5.0, 50.0),
@@ -73,7 +74,9 @@ class Kind:
         )
 
     def __str__(self) -> str:
-        return f"{self.mass}-{self.curve}-{self.sensors}" + ("-rigid" if self.chassis == "rigid" else "")
+        return f"{self.mass}-{self.curve}-{self.sensors}" + (
+            "" if self.chassis == "sprung" else f"-{self.chassis}"
+        )
 
 
 def kinds(part: Part | None = None, chassis: Chassis = "sprung") -> tuple[Kind, ...]:
@@ -140,7 +143,7 @@ def scenario(
     if kind not in kinds(chassis=kind.chassis):
         raise InputError(f"no such kind {kind}", hint="choose one of families.kinds()")
     rng = stream(seed, f"family {kind}")
-    rigid = kind.chassis == "rigid"
+    rigid = kind.chassis != "sprung"
     drawn = draw_rigid(rng, MASSES[kind.mass]) if rigid else draw_machine(rng, MASSES[kind.mass])
     machine = replace(drawn, **(known or {}))
     soils, spots = draw_soils(rng, kind.curve, machine)
@@ -190,7 +193,11 @@ def scenario(
         "soft_spots": spots(length) + soft,
         "route": {
             **_route(rng, machine, list(soils), length, turning),
-            "slope": {"sd": hills / 2.5, "length": rng.uniform(8.0, 20.0) * machine.scale},
+            "slope": {
+                "sd": hills / 2.5,
+                "length": rng.uniform(8.0, 20.0) * machine.scale,
+                "twists": kind.chassis == "rolling",
+            },
         },
         "tools": tools,
         "speed": speed,

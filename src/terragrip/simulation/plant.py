@@ -10,6 +10,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.loads import load_levers, wheel_shares
+from terragrip.simulation.chassis import warp_stiffness
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.terrain import CURVE_INTERVALS, Terrain
 from terragrip.units import STANDARD_GRAVITY
@@ -37,16 +38,6 @@ def check_layout(vehicle: Vehicle) -> None:
             place="vehicle",
             hint="give axles with one or two wheels each, and 'track:' where there are two",
         )
-
-
-def warp_stiffness(vehicle: Vehicle, torsion: float) -> Floats:
-    """Forces that corner heights cause through a chassis that resists what is no heave, pitch or roll (n, n) [N/m].
-
-    ``torsion`` is the force at each wheel of a two-axle, four-wheel chassis per metre of one diagonal over the other.
-    """
-    ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
-    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), vehicle.wheel_side], axis=1)
-    return 4.0 * torsion * (np.eye(len(ahead)) - rigid @ np.linalg.pinv(rigid))
 
 
 def _check_step(scenario: Scenario, vehicle: Vehicle) -> None:

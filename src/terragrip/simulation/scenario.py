@@ -115,11 +115,16 @@ class Plot(Part):
 
 
 class Slope(Part):
-    """The slope of the ground: ``mean`` along a straight route, and hills of slope ``sd`` over ``length`` [m]."""
+    """The slope of the ground: ``mean`` along a straight route, and hills of slope ``sd`` over ``length`` [m].
+
+    ``twists``: the hills' heights under the wheels, which lie in no plane, shift loads through a chassis that resists warp;
+    then there is no ``robot.load_variation``.
+    """
 
     mean: Angle = 0.0
     sd: Angle = 0.0
     length: PositiveLength = 10.0
+    twists: bool = False
 
 
 class Route(Part):

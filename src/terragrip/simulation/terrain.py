@@ -8,6 +8,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
+from terragrip.simulation.chassis import hill_loads
 from terragrip.simulation.fields import Field, clods, on_grid, roughness, stream
 from terragrip.simulation.route import Path, Soils, lay, soils_along
 from terragrip.simulation.scenario import Scenario, Soil, Tool
@@ -82,7 +83,11 @@ def build(scenario: Scenario, vehicle: Vehicle, seed: int) -> Terrain:
         friction=tuple(friction for friction, _ in draught),
         dig_in=tuple(dig_in for _, dig_in in draught),
         spacing=SPACING * scale,
-        load_variation=_load_variation(scenario, vehicle, path, seed),
+        load_variation=(
+            tuple(hill_loads(scenario, vehicle, path, hills, height))
+            if route.slope.twists
+            else _load_variation(scenario, vehicle, path, seed)
+        ),
     )
 
 
