@@ -245,3 +245,10 @@ def test_true_gains_undo_the_machines_errors(drawn):
         error = corrected - result.truth[f"true_drive_torque_{w}"][rows]
         sd = result.vehicle.sensors.drive_torque
         assert abs(error.mean()) < 5 * sd / np.sqrt(rows.sum())
+
+
+def test_a_machine_too_light_for_every_cone_index_gets_a_soil_still():
+    """6 kg on eight wheels: 100 kPa is a mobility number above 80 already; the draw never ended."""
+    kind = families.Kind("light", "brixius", "uncoupled", "rolling")
+    soils = families.scenario(kind, 14).soils.values()
+    assert all(10 <= float(soil.curve["mobility"]) <= 80 for soil in soils)

@@ -101,15 +101,32 @@ def _saturating(rng: np.random.Generator, machine: Machine) -> tuple[Tree, float
     return form, rng.uniform(0.04, 0.1), rng.uniform(0.0, 0.06)
 
 
+CONE_INDICES = (1e5, 3e6)  # Pa
+MOBILITIES = (10.0, 80.0)
+
+
 def _brixius(rng: np.random.Generator, machine: Machine) -> tuple[Tree, float, float]:
-    """Brixius by cone index, 100 kPa to 3 MPa; of those the mobility numbers 10 to 80 (physics.md 5)."""
+    """Brixius by cone index, 100 kPa to 3 MPa; of those the mobility numbers 10 to 80 (physics.md 5).
+
+    To a machine so light or so heavy that none of them has such a number, any of these, evenly in its logarithm.
+    """
+    load = machine.corner_mass * STANDARD_GRAVITY
+    width, diameter = 0.5 * machine.radius, 2 * machine.radius
+
+    def form(mobility: float) -> tuple[Tree, float, float]:
+        return {"name": "brixius", "mobility": mobility}, 1 / mobility, 0.5 / np.sqrt(mobility)
+
+    softest, hardest = (
+        brixius_mobility_number(cone_index, width, diameter, load, 0.2 * width, width)
+        for cone_index in CONE_INDICES
+    )
+    if softest >= MOBILITIES[1] or hardest <= MOBILITIES[0]:
+        return form(float(np.exp(rng.uniform(*np.log(MOBILITIES)))))
     while True:
-        cone_index = float(np.exp(rng.uniform(np.log(1e5), np.log(3e6))))
-        load = machine.corner_mass * STANDARD_GRAVITY
-        width, diameter = 0.5 * machine.radius, 2 * machine.radius
+        cone_index = float(np.exp(rng.uniform(*np.log(CONE_INDICES))))
         mobility = brixius_mobility_number(cone_index, width, diameter, load, 0.2 * width, width)
-        if 10.0 <= mobility <= 80.0:
-            return {"name": "brixius", "mobility": mobility}, 1 / mobility, 0.5 / np.sqrt(mobility)
+        if MOBILITIES[0] <= mobility <= MOBILITIES[1]:
+            return form(mobility)
 
 
 def _sinking(rng: np.random.Generator, machine: Machine) -> tuple[Tree, float, float]:
