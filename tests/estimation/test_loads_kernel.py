@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drives import drive, robot
-from terragrip.estimation import estimate
+from terragrip.estimation import Estimates, estimate
 from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
 from terragrip.recording import Recording
 
@@ -101,15 +101,20 @@ def test_both_measured_loads_are_taken():
 
 
 def test_lateral_acceleration_moves_load_to_the_outer_wheels():
-    """Through the adhesion: the same torque over another load."""
+    """Through the adhesion: the same torque over another load. Of a side's wheels together; of diagonals half is told (0154)."""
     sideways = 2.0
     estimates = estimate(steady(acceleration_y=sideways), robot(), held={})
     straight = estimate(steady(), robot(), held={})
     left, right = lateral_shares(2, sideways, center_of_gravity_height=0.30, track=0.554)
-    gross = [estimates[f"adhesion_{w}"][-1] + 0.02 for w in ("rl", "rr")]
-    plain = straight["adhesion_rl"][-1] + 0.02
-    assert gross[0] == pytest.approx(plain * 0.5 / left, rel=0.02)
-    assert gross[1] == pytest.approx(plain * 0.5 / right, rel=0.02)
+    front, rear = (straight[f"vertical_load_{axle}"][-1] for axle in ("front", "rear"))
+
+    def gross(table: Estimates, side: str) -> float:
+        adhesion = front * table[f"adhesion_f{side}"][-1] + rear * table[f"adhesion_r{side}"][-1]
+        return float(adhesion / (front + rear) + 0.02)
+
+    plain = gross(straight, "l")
+    assert gross(estimates, "l") == pytest.approx(plain * 0.5 / left, rel=0.02)
+    assert gross(estimates, "r") == pytest.approx(plain * 0.5 / right, rel=0.02)
 
 
 def test_roll_stands_in_for_a_missing_accelerometer():
