@@ -252,4 +252,5 @@ def test_a_machine_too_light_for_every_cone_index_gets_a_soil_still():
     kind = families.Kind("light", "brixius", "uncoupled", "rolling")
     soils = families.scenario(kind, 14).soils
     drawn = [soil.curve["mobility"] for name, soil in soils.items() if name.startswith("soil")]
-    assert drawn and all(10 <= mobility <= 80 for mobility in drawn)
+    assert drawn
+    assert all(10 <= mobility <= 80 for mobility in drawn)
