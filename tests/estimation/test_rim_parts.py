@@ -111,7 +111,9 @@ def test_speeds_stand_alone_where_no_torque_does(channels: tuple[str, ...], alon
 
 def test_settings_and_columns_of_rims() -> None:
     rims = rims_of(tractor(), ("wheel_speed_rl", "wheel_speed_fr"))
-    noise = {"wheel_speed_rl": 0.3, "wheel_speed_fr": 0.2, "ground_speed": 0.05, "angular_velocity_z": 0.01}
+    noise = {
+        "wheel_speed_rl": 0.3, "wheel_speed_fr": 0.2, "ground_speed": 0.05, "angular_velocity_z": 0.01, "ground_speed_delay": 0.15,
+    }  # fmt: skip
     s = speed_settings(
         tractor(),
         rims,
@@ -134,6 +136,7 @@ def test_settings_and_columns_of_rims() -> None:
     )
     assert (s.held_period[lib.TG_GROUND_SPEED], s.held_period[lib.TG_WHEEL_SPEED]) == (0.2, 0.0)
     assert s.uncertainty.wheel_radius == 0.02
+    assert s.ground_speed_delay == 0.15
     assert s.watch.warn == pytest.approx(2 / 3 * lib.tg_default_settings().watch.warn)
     drive = rims_of(tractor(), ("wheel_based_speed",))
     s = speed_settings(
@@ -187,11 +190,13 @@ def test_noise_of_a_channel_is_given_stated_or_guessed_from_the_size() -> None:
         "wheel_speed_rl": 0.02 / radius, "ground_speed": 0.07, "drive_torque_rl": 0.01 * weight * radius, "drawbar_force": 9.0,
         "acceleration_y": 0.3, "roll": 0.5, "angular_velocity_z": 0.01, "mass": 60.0, "hitch_load": 0.02 * weight,
         "vertical_load_rear": 0.02 * weight, "wheel_based_speed": 0.02, "pitch": 0.5,
+        "ground_speed_delay": 0.0,
     }  # fmt: skip
     assert noise == pytest.approx(expected)
     assert set(guessed) == set(channels) - {"ground_speed", "drawbar_force", "roll", "pitch"}
     assert channel_noise(vehicle, ("wheel_speed_rl",), {"wheel_speed": 0.5, "wheel_speed_rl": 0.25})[0] == {
-        "wheel_speed_rl": 0.25
+        "wheel_speed_rl": 0.25,
+        "ground_speed_delay": 0.0,
     }
     assert [sensor_of(n) for n in ("vertical_load_rear", "acceleration_x", "altitude")] == [
         "vertical_load",
