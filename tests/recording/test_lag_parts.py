@@ -248,3 +248,10 @@ def test_moments_of_slip_do_not_move_an_offset() -> None:
         slipping[start : start + 40] -= 0.7
     seconds, _ = _refined((0.0, wander(time)), (0.0, slipping), 0.25)
     assert seconds == pytest.approx(0.2, abs=0.01)
+
+
+def test_points_that_a_wrong_stamp_would_need_are_not_laid_out() -> None:
+    """A stamp ten days on would need more points than `_LONGEST`; so far off as this, more than there is memory."""
+    time = np.arange(0.0, 60.0, 0.1)
+    assert _regular(time, np.ones(600)) is not None
+    assert _regular(np.r_[time, 1e12], np.ones(601)) is None

@@ -88,7 +88,9 @@ def test_the_papers_bins_stand_beside_those_by_pull():
     assert "by_slip" not in only.soil.to_dict()
 
 
-@pytest.mark.parametrize(("runs", "words"), [(1, "of 1 run:"), (2, "of 2 runs:"), (4, "of 4 runs:"), (5, "")])
+@pytest.mark.parametrize(
+    ("runs", "words"), [(1, "of 1 run:"), (2, "of 2 runs:"), (4, "of 4 runs:"), (5, ""), (6, "")]
+)
 def test_intervals_of_few_runs_say_what_they_do_not_hold(runs, words):
     pairs = [p for seed in range(runs) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
     fine = learn_soils([p for p in pairs if p.soil == "fine"], AdhesionCurve(bootstrap=20)).soils["fine"]

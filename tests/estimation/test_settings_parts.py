@@ -1,0 +1,21 @@
+"""What the vehicle file's spreads become in the kernel's settings."""
+
+from __future__ import annotations
+
+import pytest
+
+from drives import robot
+from terragrip._kernel import ffi
+from terragrip.estimation.settings import _SENSED_SLOPE, _set_uncertainty
+
+
+@pytest.mark.parametrize(
+    ("stated", "pitch_measured", "slope"),
+    [(0.1, False, 0.1), (0.1, True, _SENSED_SLOPE), (_SENSED_SLOPE / 2, True, _SENSED_SLOPE / 2)],
+)
+def test_a_measured_pitch_leaves_its_mounting_unknown_alone(
+    stated: float, pitch_measured: bool, slope: float
+) -> None:
+    settings = ffi.new("tg_settings *")
+    _set_uncertainty(settings, robot(uncertainty={"slope": stated}), pitch_measured)
+    assert settings.uncertainty.slope == pytest.approx(slope)
