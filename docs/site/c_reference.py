@@ -10,7 +10,7 @@ _TITLES = {
     "tg_status": "Status",
     "tg_machine": "Machine, inputs, tuning",
     "tg_filter": "The filter",
-    "tg_deviation": "Considered constants",
+    "tg_deviations": "Considered constants",
     "tg_track": "Smoothing",
     "tg_curve": "The adhesion curve while driving",
     "TG_WHEEL_SPEED": "A sample's places",

@@ -135,16 +135,16 @@ tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_rea
 
 /* Considered constants (Schmidt-Kalman): constants that the data cannot tell, each with a spread. A column is d x / d p times one SD of
  * p. The reported covariance is P + sum of column column'. The columns pass through the very gains of the filter. */
-typedef struct { /* what one SD of a constant adds to what the filter computes, over one step; all 0: nothing */
-    tg_real wheel_acceleration[8]; /* rad/s^2, to d omega_i/dt */
-    tg_real acceleration;          /* m/s^2, to dv/dt */
-    tg_real accelerometer;         /* m/s^2, to the computed a_x, less what the sensor itself reads too much */
-} tg_deviation;
+typedef struct { /* what one SD of each constant adds to what the filter computes, over one step: place k of column k, 0 beyond the last */
+    tg_real wheel_acceleration[8][16]; /* wheel, rad/s^2, to d omega_i/dt */
+    tg_real acceleration[16];          /* m/s^2, to dv/dt */
+    tg_real accelerometer[16];         /* m/s^2, to the computed a_x, less what the sensor itself reads too much */
+} tg_deviations;
 typedef struct tg_consider tg_consider;
 size_t tg_consider_size(void);
 tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns); /* columns of 0 */
-/* Call after every tg_filter_step, _predict and _restart. `deviations`: one a column; null: none. */
-tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviation *deviations);
+/* Call after every tg_filter_step, _predict and _restart. `deviations` null: none. */
+tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviations *deviations);
 tg_status tg_consider_columns(const tg_consider *c, tg_real *s); /* columns by nx, state order */
 
 /* Smoother (Rauch-Tung-Striebel). Forwards: after every tg_filter_step, _predict and _restart call tg_track_step; once a row, after at
@@ -494,9 +494,9 @@ struct tg_filter {
 #define TG_FILTER_ROOM sizeof(tg_filter)                /* of any policy */
 #define TG_FILTER_ROOM_FIXED offsetof(tg_filter, policy) /* of TG_FIXED */
 
-struct tg_consider {
+struct tg_consider { /* row by row, one lane a column; 0 beyond the last */
     int32_t columns, wheels, states;
-    tg_real s[TG_MAX_CONSIDERED][TG_ROWS], prior[TG_MAX_CONSIDERED][TG_ROWS];
+    tg_real s[TG_MAX_STATES][TG_MAX_CONSIDERED], prior[TG_MAX_STATES][TG_MAX_CONSIDERED];
 };
 
 struct tg_track {

@@ -25,19 +25,19 @@ static void consider_statically(tg_estimator *e, const tg_drive *drive)
     const tg_machine *m = &s->machine;
     const int32_t n = m->wheels;
     tg_belief *b = &e->belief;
-    const tg_deviation *deviation = e->deviation;
+    const tg_deviations *const d = &e->deviations;
     tg_input u;
     tgi_along(e, drive, &u);
     tgi_deviations(e, &u, b->x);
     memset(e->consider.s, 0, sizeof e->consider.s);
     for (int32_t c = 0; c < b->columns; c++) {
-        tg_real acceleration = deviation[c].acceleration;
+        tg_real acceleration = d->acceleration[c];
         for (int32_t i = 0; i < n; i++) {
-            tg_real torque = m->inertia[i] * deviation[c].wheel_acceleration[i];
-            e->consider.s[c][i] = torque / (m->radius[i] * u.load[i]);
+            tg_real torque = m->inertia[i] * d->wheel_acceleration[i][c];
+            e->consider.s[i][c] = torque / (m->radius[i] * u.load[i]);
             acceleration += torque / (m->radius[i] * drive->mass);
         }
-        e->consider.s[c][n] = acceleration / (m->gravity * drive->cosine + drive->hitch_load * drive->inverse_mass);
+        e->consider.s[n][c] = acceleration / (m->gravity * drive->cosine + drive->hitch_load * drive->inverse_mass);
     }
 }
 

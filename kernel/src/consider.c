@@ -14,54 +14,84 @@ tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns)
     return TG_OK;
 }
 
-/* The column over the last step's map, with what one SD of its constant adds on the way. */
-TG_INLINE void consider_predict(const tg_passage *p, const tg_deviation *d, const tg_real *s, tg_real *prior, const int n)
+/* Whole lanes of columns from the k-th on, over the last step's map, with what one SD of each constant adds on the way. */
+TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_deviations *d, int k, const int n)
 {
-    tg_real v = p->keep * s[n + 1] - p->g * s[n];
-    for (int k = 0; k < n; k++) v += p->c[k] * s[k];
-    for (int k = 0; k <= n; k++) prior[k] = s[k];
-    prior[n + 1] = d ? v + p->dt * d->acceleration : v;
+    const tg_lanes rho = lanes_load(c->s[n] + k);
+    tg_lanes v = lanes_mul_sub(lanes_all(p->g), rho, lanes_mul(lanes_all(p->keep), lanes_load(c->s[n + 1] + k)));
     for (int i = 0; i < n; i++) {
-        const tg_real omega = p->phi[i] * s[n + 2 + i] + p->b[i] * s[i];
-        prior[n + 2 + i] = d ? omega + p->psi[i] * d->wheel_acceleration[i] : omega;
+        tg_real *const s = c->s[n + 2 + i] + k;
+        const tg_lanes mu = lanes_load(c->s[i] + k);
+        tg_lanes omega = lanes_mul_add(lanes_all(p->b[i]), mu, lanes_mul(lanes_all(p->phi[i]), lanes_load(s)));
+        v = lanes_mul_add(lanes_all(p->c[i]), mu, v);
+        if (d) omega = lanes_mul_add(lanes_all(p->psi[i]), lanes_load(d->wheel_acceleration[i] + k), omega);
+        lanes_store(c->prior[i] + k, mu);
+        lanes_store(c->prior[n + 2 + i] + k, omega);
+        lanes_store(s, omega);
     }
+    if (d) v = lanes_mul_add(lanes_all(p->dt), lanes_load(d->acceleration + k), v);
+    lanes_store(c->prior[n] + k, rho);
+    lanes_store(c->prior[n + 1] + k, v);
+    lanes_store(c->s[n + 1] + k, v);
 }
 
-/* The gain of the c-th channel taken, in whole lanes: the filter's, or the mean over the bank's modes. */
-static const tg_real *consider_gain(const tg_filter *f, int c, tg_real *mean)
+/* Row j of these columns after the first `taken` channels, whose residuals one SD shifts by `shift`. */
+TG_INLINE tg_lanes consider_row(const tg_consider *c, int j, int k, const tg_real (*gain)[TG_ROWS], const tg_lanes *shift, int taken)
 {
-    if (f->tuning.policy != TG_BANK) return f->gain[c];
+    tg_lanes s = lanes_load(c->s[j] + k);
+    for (int m = 0; m < taken; m++) s = lanes_mul_sub(lanes_all(gain[m][j]), shift[m], s);
+    return s;
+}
+
+/* Through the gains of the channels taken, each of which sees what the ones before it left. */
+TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, int k, const int n)
+{
+    const int taken = f->taken;
+    tg_lanes shift[TG_MAX_CHANNELS];
+    for (int m = 0; m < taken; m++) {
+        const int o = f->channel[m];
+        if (o <= n) {
+            shift[m] = consider_row(c, n + 1 + o, k, gain, shift, m);
+            continue;
+        }
+        shift[m] = d ? lanes_load(d->accelerometer + k) : lanes_all(0);
+        for (int i = 0; i <= n; i++) shift[m] = lanes_mul_add(lanes_all(f->accelerometer[i]), consider_row(c, i, k, gain, shift, m), shift[m]);
+    }
+    for (int j = 0; j < TG_TWICE(n); j++) lanes_store(c->s[j] + k, consider_row(c, j, k, gain, shift, taken));
+}
+
+/* The gains that the modes of a bank took, in the mean. */
+static void mean_gains(const tg_filter *f, tg_real (*mean)[TG_ROWS])
+{
     const tg_bank_state *const bank = &f->policy.bank;
     const tg_lanes probability = lanes_load(bank->probability);
-    for (int i = 0; i < f->stride; i++) mean[i] = i < f->states ? lanes_sum(lanes_mul(probability, lanes_load(bank->gain[c][i]))) : 0;
-    return mean;
+    for (int m = 0; m < f->taken; m++)
+        for (int i = 0; i < f->states; i++) mean[m][i] = lanes_sum(lanes_mul(probability, lanes_load(bank->gain[m][i])));
 }
 
-tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviation *deviations)
+/* Whether every number is finite. */
+static int deviations_are_finite(const tg_deviations *d, int columns, int n)
+{
+    const tg_lanes none = lanes_all(0);
+    tg_lanes zero = none; /* NaN, from an infinite or NaN term */
+    for (int k = 0; k < columns; k += TG_LANES) {
+        zero = lanes_mul_add(lanes_load(d->acceleration + k), none, lanes_mul_add(lanes_load(d->accelerometer + k), none, zero));
+        for (int i = 0; i < n; i++) zero = lanes_mul_add(lanes_load(d->wheel_acceleration[i] + k), none, zero);
+    }
+    return lanes_sum(zero) == 0;
+}
+
+tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviations *deviations)
 {
     if (!c || !f || c->wheels != f->wheels) return TG_BAD_ARGUMENT;
-    const int n = f->wheels;
-    tg_real zero = 0; /* NaN, from an infinite or NaN term */
-    for (int k = 0; deviations && k < c->columns; k++) {
-        zero += deviations[k].acceleration * 0 + deviations[k].accelerometer * 0;
-        for (int i = 0; i < n; i++) zero += deviations[k].wheel_acceleration[i] * 0;
-    }
-    if (zero != 0) return TG_NOT_FINITE;
-    for (int k = 0; k < c->columns; k++) {
-        consider_predict(&f->passage, deviations ? deviations + k : NULL, c->s[k], c->prior[k], n);
-        memcpy(c->s[k], c->prior[k], sizeof c->s[k]);
-    }
-    for (int m = 0; m < f->taken; m++) { /* channel by channel, for each column waits for its own last gain */
-        const int o = f->channel[m];
-        tg_real mean[TG_ROWS];
-        const tg_real *const gain = consider_gain(f, m, mean);
-        for (int k = 0; k < c->columns; k++) {
-            tg_real *const s = c->s[k];
-            tg_real expected = o <= n ? s[n + 1 + o] : deviations ? deviations[k].accelerometer : 0;
-            for (int i = 0; o > n && i <= n; i++) expected += f->accelerometer[i] * s[i];
-            for (int i = 0; i < f->stride; i += TG_LANES)
-                lanes_store(s + i, lanes_mul_sub(lanes_load(gain + i), lanes_all(expected), lanes_load(s + i)));
-        }
+    const int n = f->wheels, columns = c->columns, bank = f->tuning.policy == TG_BANK;
+    if (deviations && !deviations_are_finite(deviations, columns, n)) return TG_NOT_FINITE;
+    tg_real mean[TG_MAX_CHANNELS][TG_ROWS];
+    if (bank) mean_gains(f, mean);
+    const tg_real (*const gain)[TG_ROWS] = bank ? (const tg_real(*)[TG_ROWS])mean : f->gain;
+    for (int k = 0; k < columns; k += TG_LANES) {
+        consider_predict(c, &f->passage, deviations, k, n);
+        consider_update(c, f, gain, deviations, k, n);
     }
     return TG_OK;
 }
@@ -70,6 +100,6 @@ tg_status tg_consider_columns(const tg_consider *c, tg_real *s)
 {
     if (!c || !s) return TG_BAD_ARGUMENT;
     for (int k = 0; k < c->columns; k++)
-        for (int e = 0; e < c->states; e++) s[k * c->states + e] = c->s[k][tgi_row(c->wheels, e)];
+        for (int e = 0; e < c->states; e++) s[k * c->states + e] = c->s[tgi_row(c->wheels, e)][k];
     return TG_OK;
 }

@@ -16,20 +16,20 @@ int32_t tgi_deviation_columns(const tg_settings *s)
          + (u->acceleration_bias > 0);
 }
 
-/* Wheel i carries `gain[i]` more. Returns the force that this adds to the vehicle. */
-static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real *gain, tg_deviation *d)
+/* Column k: wheel i carries `gain[i]` more. Returns the force that this adds to the vehicle. */
+static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real *gain, tg_deviations *d, int32_t k)
 {
     const tg_machine *m = &e->settings.machine;
     tg_real force = 0;
     for (int32_t i = 0; i < m->wheels; i++) {
-        d->wheel_acceleration[i] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain[i] * e->constants.inverse_inertia[i];
+        d->wheel_acceleration[i][k] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain[i] * e->constants.inverse_inertia[i];
         force += mu[i] * gain[i];
     }
     return force;
 }
 
 /* What the front axles gain and the rear axles lose: a share of the mean axle load, and what an unseen pull may move, which is at most all of rho_s. */
-static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
+static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
 {
     const tg_settings *s = &e->settings;
     tg_real largest = 0, gain[TG_MAX_WHEELS];
@@ -40,14 +40,14 @@ static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_m
     const tg_real pull = pull_is_unseen(s) ? mu[s->machine.wheels] * weight * s->hitch_height : 0;
     const tg_real moment = tgi_sqrt(share * share + pull * pull);
     for (int32_t i = 0; i < s->machine.wheels; i++) gain[i] = moment * s->load_transfer[s->wheel_axle[i]] * s->wheel_share[i];
-    d->acceleration = d->accelerometer = add_loads(e, mu, gain, d) * inverse_mass;
+    d->acceleration[k] = d->accelerometer[k] = add_loads(e, mu, gain, d, k) * inverse_mass;
 }
 
 /* Of the vertical hitch load, wheel i's part. */
 static tg_real hitch_part(const tg_settings *s, int32_t i) { return s->hitch_share[s->wheel_axle[i]] * s->wheel_share[i]; }
 
 /* More mass: the loads grow with it, but for what the hitch does to them, and the forces move the vehicle less. */
-static void add_mass(const tg_estimator *e, const tg_input *u, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
+static void add_mass(const tg_estimator *e, const tg_input *u, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
@@ -59,17 +59,17 @@ static void add_mass(const tg_estimator *e, const tg_input *u, tg_real inverse_m
         gain[i] = share * (u->load[i] - hitch);
         balance += mu[i] * u->load[i];
     }
-    d->acceleration = d->accelerometer = (add_loads(e, mu, gain, d) - share * balance) * inverse_mass;
+    d->acceleration[k] = d->accelerometer[k] = (add_loads(e, mu, gain, d, k) - share * balance) * inverse_mass;
 }
 
-static void add_hitch_load(const tg_estimator *e, tg_real inverse_mass, const tg_real *mu, tg_deviation *d)
+static void add_hitch_load(const tg_estimator *e, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
     const tg_real spread = tgi_hitch_spread(e);
     tg_real gain[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) gain[i] = spread * hitch_part(s, i);
-    d->acceleration = d->accelerometer = (add_loads(e, mu, gain, d) - mu[n] * spread) * inverse_mass;
+    d->acceleration[k] = d->accelerometer[k] = (add_loads(e, mu, gain, d, k) - mu[n] * spread) * inverse_mass;
 }
 
 /* The slope is known better where the motion shows it; what it leaves unknown of a whole slope is noise, see slope.c. */
@@ -80,7 +80,7 @@ static tg_real slope_spread(const tg_estimator *e)
     return e->pitch.count == 0 ? 0 : found < given ? found : given;
 }
 
-/* Work out e->deviation, one a constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` adhesion and rho_s.
+/* Work out e->deviations, a column for each constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` adhesion and rho_s.
  * What a constant does not touch stays 0 from the start. */
 void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
 {
@@ -89,34 +89,35 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
     const tg_real *inverse_inertia = e->constants.inverse_inertia;
     const int32_t n = s->machine.wheels;
     const tg_real mass = u->mass > 0 ? u->mass : s->machine.mass, inverse_mass = u->mass > 0 ? 1 / u->mass : e->constants.inverse_mass;
-    tg_deviation *d = e->deviation;
+    tg_deviations *d = &e->deviations;
+    int32_t k = 0;
     if (spread->drive_torque_gain > 0 || spread->drive_torque_offset > 0)
         for (int32_t i = 0; i < n; i++) {
             if (!s->driven[i]) continue;
             tg_real variance = tgi_square(spread->drive_torque_gain * u->torque[i]) + tgi_square(spread->drive_torque_offset);
-            (d++)->wheel_acceleration[i] = tgi_sqrt(variance) * inverse_inertia[i];
+            d->wheel_acceleration[i][k++] = tgi_sqrt(variance) * inverse_inertia[i];
         }
     if (spread->drive_torque_gain_common > 0) {
         for (int32_t i = 0; i < n; i++)
-            d->wheel_acceleration[i] = spread->drive_torque_gain_common * u->torque[i] * inverse_inertia[i];
-        d++;
+            d->wheel_acceleration[i][k] = spread->drive_torque_gain_common * u->torque[i] * inverse_inertia[i];
+        k++;
     }
     if (spread->drawbar_gain > 0 || spread->drawbar_offset > 0) {
         tg_real variance = tgi_square(spread->drawbar_gain * u->drawbar) + tgi_square(spread->drawbar_offset);
-        d->acceleration = d->accelerometer = -tgi_sqrt(variance) * inverse_mass;
-        d++;
+        d->acceleration[k] = d->accelerometer[k] = -tgi_sqrt(variance) * inverse_mass;
+        k++;
     }
-    if (spread->slope > 0) (d++)->acceleration = -s->machine.gravity * slope_spread(e); /* cos(slope) moves by its square only */
+    if (spread->slope > 0) d->acceleration[k++] = -s->machine.gravity * slope_spread(e); /* cos(slope) moves by its square only */
     if (spread->tire_rolling_resistance > 0) {
         for (int32_t i = 0; i < n; i++)
-            d->wheel_acceleration[i] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];
-        d++;
+            d->wheel_acceleration[i][k] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];
+        k++;
     }
-    if (spread->vertical_load > 0 || pull_is_unseen(s)) shift_loads(e, mass * s->machine.gravity, inverse_mass, mu, d++);
-    if (spread->mass > 0 || s->weighed) add_mass(e, u, inverse_mass, mu, d++);
-    if (s->carrying) add_hitch_load(e, inverse_mass, mu, d++);
+    if (spread->vertical_load > 0 || pull_is_unseen(s)) shift_loads(e, mass * s->machine.gravity, inverse_mass, mu, d, k++);
+    if (spread->mass > 0 || s->weighed) add_mass(e, u, inverse_mass, mu, d, k++);
+    if (s->carrying) add_hitch_load(e, inverse_mass, mu, d, k++);
     if (spread->acceleration_bias > 0) {
-        d->accelerometer = -spread->acceleration_bias;
-        d->acceleration = e->slope.running ? -spread->acceleration_bias : 0; /* the slope takes it along, see slope.c */
+        d->accelerometer[k] = -spread->acceleration_bias;
+        d->acceleration[k] = e->slope.running ? -spread->acceleration_bias : 0; /* the slope takes it along, see slope.c */
     }
 }

@@ -113,7 +113,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
         status = tg_filter_predict(&e->filter, dt, &over, q);
-        if (status == TG_OK) tgi_follow(e, e->deviation);
+        if (status == TG_OK) tgi_follow(e, &e->deviations);
     }
     if (pieces > 1 && status == TG_OK) carry_shared(&e->filter, pieces, row->shared);
     if (status == TG_OK) status = tg_filter_step_shared(&e->filter, dt, &over, &now, q, row->shared, y, r, &step);
@@ -122,7 +122,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         tgi_restart_from(e, row, 0);
         return 0;
     }
-    tgi_follow(e, e->deviation);
+    tgi_follow(e, &e->deviations);
     watch_shocks(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
     tgi_watch_innovation(e, row, &step);
@@ -205,7 +205,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.slow_speed = tgi_slow_variance(e);
     e->scene.disputed = tgi_disputed_variance(e, drive);
     e->scene.late = tgi_late_variance(e, drive);
-    tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_ROWS])e->consider.s, &e->scene, o);
+    tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_MAX_CONSIDERED])e->consider.s, &e->scene, o);
     o[TG_OUT_NIS] = e->belief.nis;
     o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     o[TG_OUT_SUPERVISOR] = e->belief.supervisor;

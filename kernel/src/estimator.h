@@ -194,7 +194,7 @@ typedef struct { /* what follows from the settings alone */
 struct tg_estimator {
     tg_settings settings;
     tgi_constants constants;
-    tg_deviation deviation[TG_MAX_CONSIDERED];
+    tg_deviations deviations;
     int32_t started;           /* a sample was seen */
     int32_t seen_motion;       /* a wheel or ground speed was seen: the outputs are numbers */
     int32_t standing;          /* at standstill */
@@ -297,7 +297,7 @@ tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_slow_variance(const tg_estimator *e);
 
 /* restarts.c */
-void tgi_follow(tg_estimator *e, const tg_deviation *deviation);
+void tgi_follow(tg_estimator *e, const tg_deviations *deviations);
 void tgi_forget(tg_estimator *e);
 void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk);
 void tgi_unknown_adhesion(tg_estimator *e);
@@ -354,5 +354,5 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
     return result;
 }
 
-void tgi_traction(const tg_settings *s, const tg_real *warp, const tg_belief *b, const tg_real (*S)[TG_ROWS], const tgi_scene *scene, tg_real *o);
+void tgi_traction(const tg_settings *s, const tg_real *warp, const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED], const tgi_scene *scene, tg_real *o);
 #endif

@@ -88,7 +88,7 @@ const tgi_field tgi_consider_fields[] = {REALS(tg_consider, s), REALS(tg_conside
 #define HOLDS(m) INSIDE(T, m, tg_hold, hold)
 #define LOWPASS(m) INSIDE(T, m, tg_lowpass, lowpass)
 const tgi_field tgi_estimator_fields[] = {
-    REALS(T, deviation), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
+    REALS(T, deviations), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
     HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
     DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(soon_ground), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),

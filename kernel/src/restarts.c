@@ -4,9 +4,9 @@
 #define TG_NO_TIME ((tg_real)1e-6) /* s */
 
 /* Considered columns, and a smoother's track, go along with whatever the filter just did. */
-void tgi_follow(tg_estimator *e, const tg_deviation *deviation)
+void tgi_follow(tg_estimator *e, const tg_deviations *deviations)
 {
-    tg_consider_step(&e->consider, &e->filter, deviation);
+    tg_consider_step(&e->consider, &e->filter, deviations);
     if (e->track) tg_track_step(e->track, &e->filter);
 }
 

@@ -168,8 +168,8 @@ tg_status tg_record_take(tg_real *record, tg_track *t, const tg_filter *f, const
         record[l.prior + (size_t)e] = f->x_prior[tgi_row(n, e)];
         for (int k = 0; k < l.columns; k++) {
             const size_t at = (size_t)(k * l.states + e);
-            record[l.s + at] = c->s[k][tgi_row(n, e)];
-            record[l.s_prior + at] = c->prior[k][tgi_row(n, e)];
+            record[l.s + at] = c->s[tgi_row(n, e)][k];
+            record[l.s_prior + at] = c->prior[tgi_row(n, e)][k];
         }
     }
     tg_real *const map = record + l.map;

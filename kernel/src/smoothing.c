@@ -69,14 +69,14 @@ static void step_back(const tg_estimator *e, const tg_real *here, const tg_real 
     tg_record_moments(n, columns, here, m->x, m->P, m->s);
 }
 
-static void to_rows(const tg_estimator *e, const tgi_smoothed *m, tg_belief *b, tg_real (*S)[TG_ROWS])
+static void to_rows(const tg_estimator *e, const tgi_smoothed *m, tg_belief *b, tg_real (*S)[TG_MAX_CONSIDERED])
 {
     const int32_t n = e->settings.machine.wheels, states = e->filter.states, stride = e->filter.stride;
     for (int32_t j = 0; j < states; j++) {
         const int32_t row = tgi_row(n, j);
         b->x[row] = m->x[j];
         for (int32_t k = 0; k < states; k++) b->P[row * stride + tgi_row(n, k)] = m->P[j * states + k];
-        for (int32_t c = 0; c < e->consider.columns; c++) S[c][row] = m->s[c * states + j];
+        for (int32_t c = 0; c < e->consider.columns; c++) S[row][c] = m->s[c * states + j];
     }
     b->columns = e->consider.columns;
 }
@@ -106,7 +106,7 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
     }
     tgi_smoothed m = inside(e, carry);
     tg_belief belief;
-    tg_real S[TG_MAX_CONSIDERED][TG_ROWS], warp[TG_MAX_WHEELS];
+    tg_real S[TG_MAX_STATES][TG_MAX_CONSIDERED] = {{0}}, warp[TG_MAX_WHEELS];
     for (size_t row = rows; row-- > 0;) {
         const tg_real *here = records + row * tg_smooth_length(e);
         tgi_scene scene;
@@ -114,7 +114,7 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
         step_back(e, here, next, &m);
         to_rows(e, &m, &belief, S);
         if (e->constants.warps) tgi_warp(&e->constants, belief.x, warp);
-        tgi_traction(&e->settings, e->constants.warps ? warp : scene.warp, &belief, (const tg_real(*)[TG_ROWS])S, &scene, value);
+        tgi_traction(&e->settings, e->constants.warps ? warp : scene.warp, &belief, (const tg_real(*)[TG_MAX_CONSIDERED])S, &scene, value);
         put(value, out, row, TG_OUT_VERTICAL_LOAD);
         next = here;
     }

@@ -5,39 +5,43 @@ typedef struct { /* second moments of (omega_i, v, mu_i, rho_s): the filter's an
     tg_real ww[8], wv[8], wm[8], wr[8], mm[8], mr[8], vm[8], vv, vr, rr;
 } tgi_moments;
 
-TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_ROWS], const int n, const int stride, tgi_moments *c)
+/* The filter's moments, and the sums over the columns of the products of their rows. */
+TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED], const int n, const int stride, tgi_moments *c)
 {
-    const int r = n, v = n + 1, w = n + 2;
+    const int r = n, v = n + 1, w = n + 2, columns = b->columns;
     const tg_real *P = b->P, *Pr = P + r * stride, *Pv = P + v * stride;
+    const tg_lanes none = lanes_all(0);
+    tg_lanes rr = none, vr = none, vv = none;
     for (int i = 0; i < n; i++) {
         const tg_real *Pw = P + (w + i) * stride;
-        c->mm[i] = P[i * stride + i];
-        c->mr[i] = Pr[i];
-        c->vm[i] = Pv[i];
-        c->wm[i] = Pw[i];
-        c->wr[i] = Pw[r];
-        c->wv[i] = Pw[v];
-        c->ww[i] = Pw[w + i];
-    }
-    c->rr = Pr[r];
-    c->vr = Pv[r];
-    c->vv = Pv[v];
-    for (int k = 0; k < b->columns; k++) {
-        const tg_real *s = S[k], sr = s[r], sv = s[v];
-        for (int i = 0; i < n; i++) {
-            const tg_real sm = s[i], sw = s[w + i];
-            c->mm[i] += sm * sm;
-            c->mr[i] += sm * sr;
-            c->vm[i] += sm * sv;
-            c->wm[i] += sm * sw;
-            c->wr[i] += sw * sr;
-            c->wv[i] += sw * sv;
-            c->ww[i] += sw * sw;
+        tg_lanes mm = none, mr = none, vm = none, wm = none, wr = none, wv = none, ww = none;
+        for (int k = 0; k < columns; k += TG_LANES) {
+            const tg_lanes sm = lanes_load(S[i] + k), sw = lanes_load(S[w + i] + k), sr = lanes_load(S[r] + k), sv = lanes_load(S[v] + k);
+            mm = lanes_mul_add(sm, sm, mm);
+            mr = lanes_mul_add(sm, sr, mr);
+            vm = lanes_mul_add(sm, sv, vm);
+            wm = lanes_mul_add(sm, sw, wm);
+            wr = lanes_mul_add(sw, sr, wr);
+            wv = lanes_mul_add(sw, sv, wv);
+            ww = lanes_mul_add(sw, sw, ww);
         }
-        c->rr += sr * sr;
-        c->vr += sv * sr;
-        c->vv += sv * sv;
+        c->mm[i] = P[i * stride + i] + lanes_sum(mm);
+        c->mr[i] = Pr[i] + lanes_sum(mr);
+        c->vm[i] = Pv[i] + lanes_sum(vm);
+        c->wm[i] = Pw[i] + lanes_sum(wm);
+        c->wr[i] = Pw[r] + lanes_sum(wr);
+        c->wv[i] = Pw[v] + lanes_sum(wv);
+        c->ww[i] = Pw[w + i] + lanes_sum(ww);
     }
+    for (int k = 0; k < columns; k += TG_LANES) {
+        const tg_lanes sr = lanes_load(S[r] + k), sv = lanes_load(S[v] + k);
+        rr = lanes_mul_add(sr, sr, rr);
+        vr = lanes_mul_add(sv, sr, vr);
+        vv = lanes_mul_add(sv, sv, vv);
+    }
+    c->rr = Pr[r] + lanes_sum(rr);
+    c->vr = Pv[r] + lanes_sum(vr);
+    c->vv = Pv[v] + lanes_sum(vv);
 }
 
 /* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. The ground speed may be off for
@@ -108,7 +112,7 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
 
 /* All values that follow from the belief; in place of `warp`, what its adhesions are beyond all trends, they have the scene's (warp.c). Speeds
  * get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
-void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, const tg_belief *restrict b, const tg_real (*restrict S)[TG_ROWS],
+void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, const tg_belief *restrict b, const tg_real (*restrict S)[TG_MAX_CONSIDERED],
                   const tgi_scene *restrict scene, tg_real *restrict o)
 {
     const int32_t n = s->machine.wheels;

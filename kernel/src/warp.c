@@ -58,9 +58,13 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
  * wheels need only be finite. */
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp)
 {
-    memset(warp, 0, TG_MAX_WHEELS * sizeof *warp);
-    for (int j = 0; j < TG_MAX_WHEELS; j++)
-        for (int i = 0; i < TG_MAX_WHEELS; i++) warp[i] += c->beyond[j][i] * value[j];
+    tg_lanes first = lanes_all(0), last = first;
+    for (int j = 0; j < TG_MAX_WHEELS; j++) {
+        first = lanes_mul_add(lanes_load(c->beyond[j]), lanes_all(value[j]), first);
+        last = lanes_mul_add(lanes_load(c->beyond[j] + TG_LANES), lanes_all(value[j]), last);
+    }
+    lanes_store(warp, first);
+    lanes_store(warp + TG_LANES, last);
 }
 
 /* Slips of all wheels, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */

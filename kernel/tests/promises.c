@@ -45,7 +45,7 @@ static void filter_floor(int n, int engine, int policy)
     const int states = 2 * n + 2;
     tg_tuning t = tg_default_tuning(), other;
     tg_real x[NX] = {0}, P[NX * NX], y[NY], r[NY], q[NX] = {0}, U[NX * NX], D[NX];
-    tg_deviation deviation[2];
+    tg_deviations deviations;
     tg_input u = random_input(&m), now;
     t.engine = engine;
     t.policy = policy;
@@ -53,7 +53,7 @@ static void filter_floor(int n, int engine, int policy)
     random_covariance(states, 1, P);
     CHECK(tg_filter_init(&f, &m, &t, x, P) == TG_OK, "init");
     CHECK(tg_consider_init(&c, &f, 2) == TG_OK && tg_track_init(&track, &f) == TG_OK, "init");
-    memset(deviation, 0, sizeof deviation);
+    memset(&deviations, 0, sizeof deviations);
     for (int k = 0; k < n + 2; k++) y[k] = (tg_real)uniform(0, 1), r[k] = (tg_real)0.01;
     for (int k = 0; k < 8; k++) CHECK(tg_filter_step(&f, (tg_real)0.01, &u, &u, q, y, r, &step) == TG_OK, "step");
     for (int k = n + 2; k < TG_MAX_CHANNELS; k++)
@@ -98,8 +98,8 @@ static void filter_floor(int n, int engine, int policy)
         WITH(q[0], tg_filter_step_shared(&f, (tg_real)0.01, &u, &u, NULL, q, y, r, &step));
         WITH(q[n], tg_filter_step_shared(&f, (tg_real)0.01, &u, &u, NULL, q, y, r, &step));
         if (k > 0) WITH(y[0], tg_filter_step(&f, (tg_real)0.01, &u, &u, q, y, r, &step));
-        WITH(deviation[1].wheel_acceleration[n - 1], tg_consider_step(&c, &f, deviation));
-        WITH(deviation[0].accelerometer, tg_consider_step(&c, &f, deviation));
+        WITH(deviations.wheel_acceleration[n - 1][1], tg_consider_step(&c, &f, &deviations));
+        WITH(deviations.accelerometer[0], tg_consider_step(&c, &f, &deviations));
 #undef WITH
     }
     r[0] = 0;

@@ -268,10 +268,11 @@ class Deviations:
         n = case.wheels
         self.spin, self.push = rng.normal(size=(columns, n)), rng.normal(size=columns)
         self.reading = rng.normal(size=columns)
-        self.kernel = ffi.new("tg_deviation[]", columns)
-        for i in range(columns):
-            self.kernel[i].wheel_acceleration[0:n] = self.spin[i].tolist()
-            self.kernel[i].acceleration, self.kernel[i].accelerometer = self.push[i], self.reading[i]
+        self.kernel = ffi.new("tg_deviations *")
+        for i in range(n):
+            self.kernel.wheel_acceleration[i][0:columns] = self.spin[:, i].tolist()
+        self.kernel.acceleration[0:columns] = self.push.tolist()
+        self.kernel.accelerometer[0:columns] = self.reading.tolist()
         self.columns = np.zeros((2 * n + 2, columns), np.longdouble)
         self.prior = self.columns
 
