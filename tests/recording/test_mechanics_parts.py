@@ -315,11 +315,11 @@ def test_without_motion_or_vehicle_nothing_is_said(vehicle: Vehicle) -> None:
     time = np.arange(0.0, 60.0, 0.5)
     for speed in (np.zeros(120), np.ones(120)):
         log = Recording(time, {"ground_speed": speed})
-        assert motion_warnings(log, vehicle, means_of(log)) == []
+        assert motion_warnings(log, vehicle, means_of(log), {}) == []
     change = np.sin(time / 3)
     speed = 10.0 + np.cumsum(change) * 0.5
     log = Recording(time, {"ground_speed": speed, "acceleration_x": -change})
-    notes = motion_warnings(log, None, means_of(log))
+    notes = motion_warnings(log, None, means_of(log), {})
     assert notes == [
         "acceleration_x is not the change of ground speed but its opposite: forward is positive: write 'sign: -1' for it in the profile."
     ]

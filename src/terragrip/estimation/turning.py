@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from terragrip.arrays import Floats, Ints
+from terragrip.arrays import Floats
 from terragrip.estimation.rims import Rim, rims_of
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.track import Track, track_of
-from terragrip.recording.window_means import window_means
+from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
 
 _CALM = 4.0  # s that a rate of turn by positions is taken over
@@ -47,8 +48,9 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     """A sentence on a rate of turn that is missing."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
-    place = ((log.time - log.time[0]) / _WINDOW).astype(np.intp)
-    left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], log, place) for sign in (1, -1))
+    speeds = {rim.channel: log.channels[rim.channel] for rim in rims}
+    calm = averaged(replace(log, channels=speeds, labels={}), _WINDOW).channels
+    left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], calm) for sign in (1, -1))
     with np.errstate(invalid="ignore"):
         mean = np.abs(left + right) / 2
         moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
@@ -61,7 +63,6 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     ]
 
 
-def _rim_means(rims: Sequence[Rim], log: Recording, place: Ints) -> Floats:
-    """Mean rim speed (windows,) [m/s] of some wheels, NaN where none was measured."""
-    values = np.concatenate([np.empty(0), *(rim.radius * log.channels[rim.channel] for rim in rims)])
-    return window_means(values, np.tile(place, len(rims)), int(place[-1]) + 1)
+def _rim_means(rims: Sequence[Rim], speeds: Mapping[str, Floats]) -> Floats:
+    """Mean rim speed (windows,) [m/s] of some wheels, NaN where one was not measured."""
+    return np.mean([rim.radius * speeds[rim.channel] for rim in rims] or [np.full(1, np.nan)], axis=0)

@@ -109,19 +109,21 @@ class Means:
         return _Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else _Fit()
 
 
-def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means | None) -> list[str]:
-    """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change."""
+def motion_warnings(
+    recording: Recording, vehicle: Vehicle | None, means: Means | None, thrusts: dict[str, Floats]
+) -> list[str]:
+    """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change;
+    ``thrusts``: those of `thrusts_of`."""
     if means is None:
         return []
     forward = (
         means.of(recording.channels["acceleration_x"]) if "acceleration_x" in recording.channels else None
     )
-    thrusts: dict[str, Floats] = {}
     notes: list[str] = []
     if vehicle is not None and vehicle.knows_wheels:
         notes = _dead_warnings(recording, vehicle)
         notes += _radius_warnings(recording, vehicle, means)
-        thrusts = {} if notes else thrusts_of(recording, vehicle, means)
+        thrusts = {} if notes else thrusts
         notes += _pull_warnings(means, thrusts, recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)

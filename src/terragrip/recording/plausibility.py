@@ -10,7 +10,7 @@ import numpy.typing as npt
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
-from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings
+from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
@@ -66,7 +66,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
     sided = [] if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
-    moved = motion_warnings(recording, vehicle, means)
+    thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
+    moved = motion_warnings(recording, vehicle, means, thrusts)
     notes = [
         *(_speed_warnings(recording, known) if known is not None and not sided else ()),
         *sided,
@@ -77,7 +78,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *angles,
         *_acceleration_warnings(recording),
         *moved,
-        *(torque_warnings(recording, known, means) if known is not None and not moved else ()),
+        *(torque_warnings(recording, known, means, thrusts) if known is not None and not moved else ()),
         *(inertial_warnings(recording, known) if known is not None else ()),
         *frozen,
         *times,

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
-from terragrip.recording.mechanics import Means, driven_radii, thrusts_of
+from terragrip.recording.mechanics import Means, driven_radii
+from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -33,13 +34,17 @@ _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
 
 
-def torque_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
-    """Sentences on torques of another scale than the pull, and on torques that are late or early."""
-    return _scale_warnings(recording, vehicle, means) or _lag_warnings(recording, vehicle)
+def torque_warnings(
+    recording: Recording, vehicle: Vehicle, means: Means | None, beyond_pull: dict[str, Floats]
+) -> list[str]:
+    """Sentences on torques of another scale than the pull, and on torques that are late or early; ``beyond_pull``: thrusts as
+    `thrusts_of` gives them."""
+    return _scale_warnings(recording, vehicle, means, beyond_pull) or _lag_warnings(recording, vehicle)
 
 
-def _scale_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
-    beyond_pull = {} if means is None else thrusts_of(recording, vehicle, means)
+def _scale_warnings(
+    recording: Recording, vehicle: Vehicle, means: Means | None, beyond_pull: dict[str, Floats]
+) -> list[str]:
     if means is None or not beyond_pull:
         return []
     rest = np.sum(list(beyond_pull.values()), axis=0)
@@ -93,17 +98,18 @@ class _Course:
             return None
         points, step = found
 
-        def at(name: str) -> Floats:
-            known = np.isfinite(channels[name])
-            return np.interp(points, time[known], channels[name][known])
+        def at(values: Floats) -> Floats:
+            return np.interp(points, time, values)
 
-        thrust = (
-            np.sum([at(f"drive_torque_{w}") / radius for w, radius in radii.items()], axis=0) / vehicle.mass
-        )
-        rim = np.mean([radius * at(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0)
+        def known(name: str) -> Floats:
+            return filled(time, channels[name])
+
+        thrusts = [known(f"drive_torque_{w}") / radius for w, radius in radii.items()]
+        thrust = at(np.sum(thrusts, axis=0)) / vehicle.mass
+        rim = at(np.mean([radius * known(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0))
         force = np.gradient(smooth(rim, CALM, step), step)
         if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
-            force = force + at("drawbar_force") / vehicle.mass
+            force = force + at(known("drawbar_force")) / vehicle.mass
         moving = rim > _MOVING * float(np.quantile(rim, 0.95))
         return cls(step, quick(thrust, step), quick(force, step), moving)
 

@@ -56,10 +56,14 @@ def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
 
 def windows(time: Floats, values: Floats) -> Floats:
     """Means of channels (k, n) over the windows of 2 s in which all of them have a possible value (k, m)."""
+    first = time[0]
     known = (np.abs(values) < _MOST).all(axis=0)
-    place = ((time - time[0]) / WINDOW).astype(np.intp)[known]
-    count = np.bincount(place) if known.any() else np.zeros(0)
-    return np.array([np.bincount(place, row[known])[count > 0] / count[count > 0] for row in values])
+    if not known.all():
+        time, values = time[known], values[:, known]
+    if not len(time):
+        return np.empty((len(values), 0))
+    starts = np.flatnonzero(np.diff(np.floor((time - first) / WINDOW), prepend=-1.0))
+    return np.add.reduceat(values, starts, axis=1) / np.diff(starts, append=len(time))
 
 
 def _correlation(a: Floats, b: Floats) -> float:
