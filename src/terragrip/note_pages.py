@@ -36,6 +36,7 @@ PAGES = (
     ("angular_velocity_z turns with", "formats#in-a-profile"),
     ("a sensor that is dead", "formats#what-the-motion-contradicts"),
     ("while other speeds change", "formats#what-the-motion-contradicts"),
+    ("in turns backward", "formats#what-the-motion-contradicts"),
     ("its sensor is dead", "formats#what-the-motion-contradicts"),
     ("Columns that are not used", "formats#in-a-profile"),
     ("the vehicle is taken to tow nothing", "vehicle#signals-that-are-missing"),

@@ -11,6 +11,7 @@ from terragrip.recording.axles import axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
+from terragrip.recording.reverse import reverse_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
@@ -85,6 +86,9 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     ]
     if notes or known is None:
         return notes
+    backward = reverse_warnings(recording, known)
+    if backward:
+        return backward
     return exchanged_torques(recording, known, shown) or axle_warnings(recording, known, means)
 
 

@@ -1,0 +1,74 @@
+"""Speeds without a sign while the vehicle drives backward: sentences for the user, never errors.
+
+A receiver's speed over ground is the size of the velocity, and counters of ticks have no direction. Backward, a turn to the left makes
+the left hub the faster one in size: with the sign lost, each side's slip is against the other side's hub.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Bools, Floats
+from terragrip.recording.turns import filled, windows
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_FAST = 0.3  # of what a twentieth of the drive exceeds
+_SHARE = 0.03  # of the driving that is backward
+_ALIKE = 0.9  # of the rows, or windows, that have one sign
+_FEWEST = 5  # windows
+
+_WRONG = "in turns backward the slips of both sides are wrong."
+
+
+def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where the ground speed stays positive while the wheels turn backward, or where both do and a gyroscope tells of it."""
+    channels, time = recording.channels, recording.time
+    known = [w for w in vehicle.wheels if np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any()]
+    ground = channels.get("ground_speed")
+    if ground is None or not known or not np.isfinite(ground).any():
+        return []
+    rims = {w: filled(time, channels[f"wheel_speed_{w}"]) for w in known}
+    rim, speed = np.mean(list(rims.values()), axis=0), filled(time, ground)
+    moving = _large(rim) & _large(speed)
+    back = moving & (rim < 0)
+    if not moving.any() or np.mean(speed[moving] < 0) > 1 - _ALIKE:
+        return []
+    if np.mean(back[moving]) >= _SHARE:
+        ahead = moving & (rim > 0)
+        if ahead.any() and np.mean(speed[back] > 0) > _ALIKE and np.mean(speed[ahead] > 0) > _ALIKE:
+            return [
+                f"ground_speed has no sign: it is positive also while the wheels turn backward, and {_WRONG} Give it the sign of the "
+                "direction (in a profile 'forward:', with positions)."
+            ]
+        return []
+    yaw = channels.get("angular_velocity_z")
+    sides = [
+        rims[axle.wheels[-1]] - rims[axle.wheels[0]]
+        for axle in vehicle.axles.values()
+        if len(axle.wheels) > 1 and {axle.wheels[0], axle.wheels[-1]} <= rims.keys()
+    ]
+    if yaw is None or not sides:
+        return []
+    turn, shown = windows(time, np.array([np.mean(sides, axis=0), yaw]))
+    turning = _large(turn) & _large(shown)
+    against = float(np.mean((turn * shown)[turning] < 0)) if turning.sum() >= _FEWEST else 0.0
+    if not 1 - _ALIKE < against < _ALIKE:
+        return []
+    return [
+        f"In {against:.0%} of the turns angular_velocity_z goes against the wheels' speeds: where these have no sign, that is backward, "
+        f"and {_WRONG} Give wheel and ground speeds the sign of the direction."
+    ]
+
+
+def _large(values: Floats) -> Bools:
+    """Which values (n,) are large beside those of the drive."""
+    size = np.abs(values)
+    finite = size[np.isfinite(size)]
+    return (
+        size > _FAST * float(np.quantile(finite, 0.95)) if len(finite) else np.zeros(len(values), dtype=bool)
+    )
