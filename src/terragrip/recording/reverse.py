@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.turns import filled, windows
+from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -21,6 +21,7 @@ _FAST = 0.3  # of what a twentieth of the drive exceeds
 _SHARE = 0.03  # of the driving that is backward
 _ALIKE = 0.9  # of the rows, or windows, that have one sign
 _FEWEST = 5  # windows
+_TOGETHER = 0.7  # correlation
 
 _WRONG = "in turns backward the slips of both sides are wrong."
 
@@ -56,6 +57,8 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return []
     turn, shown = windows(time, np.array([np.mean(sides, axis=0), yaw]))
     turning = _large(turn) & _large(shown)
+    if np.sum(np.abs(shown)) * WINDOW < LEAST_TURN or not _go_alike(np.abs(turn), np.abs(shown)):
+        return []
     against = float(np.mean((turn * shown)[turning] < 0)) if turning.sum() >= _FEWEST else 0.0
     if not 1 - _ALIKE < against < _ALIKE:
         return []
@@ -63,6 +66,12 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         f"In {against:.0%} of the turns angular_velocity_z goes against the wheels' speeds: where these have no sign, that is backward, "
         f"and {_WRONG} Give wheel and ground speeds the sign of the direction."
     ]
+
+
+def _go_alike(a: Floats, b: Floats) -> bool:
+    """Whether two sizes (n,) are of one thing: both vary, and together."""
+    varied = len(a) > _FEWEST and float(min(np.ptp(a), np.ptp(b))) > 0.0
+    return varied and float(np.corrcoef(a, b)[0, 1]) > _TOGETHER
 
 
 def _large(values: Floats) -> Bools:
