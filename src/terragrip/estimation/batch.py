@@ -18,7 +18,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
-from terragrip.recording.alignment import aligned
+from terragrip.recording.alignment import set_right
 
 if TYPE_CHECKING:
     import os
@@ -71,9 +71,11 @@ def estimate(
     ------
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is used with ``smooth``.
     """
-    log = recording if isinstance(recording, Recording) else next(aligned([Recording.from_frame(recording)]))
+    log, delay = (
+        (recording, None) if isinstance(recording, Recording) else set_right(Recording.from_frame(recording))
+    )
     options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
-    (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress)
+    (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress, delay=delay)
     return result
 
 
@@ -86,13 +88,16 @@ def estimated(
     planned: Callable[[int, tuple[str, ...]], None] | None = None,
     progress: Progress | None = None,
     together: int = 1,
+    delay: float | None = None,
 ) -> Iterator[Estimates]:
     """The estimates of a log in blocks, a table for each block, in the order of time; ``options``: None: the defaults of :func:`estimate`.
 
     A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so the size of the blocks
     changes no digit. ``beside``: blocks that wait for the backward pass of ``smooth`` are written next to this folder, if the log
     has more than one block; None: the system's folder. ``planned`` is called with the rows and the columns to come, before any row is
-    estimated. ``together``: see :class:`TractionEstimator`. Raises InputError as :func:`estimate` does, each when its block is reached.
+    estimated. ``together``: see :class:`TractionEstimator`. ``delay``: SD [s] of what the ground speed is late
+    by behind the wheels, where it is known already; None: the first pass finds it. Raises InputError as :func:`estimate` does, each when
+    its block is reached.
     """
     options = options or RunOptions()
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
@@ -110,7 +115,7 @@ def estimated(
         )
         return
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)
-    known = survey_of(log, passes.of(0) if log.from_disk else None)
+    known = survey_of(log, passes.of(0) if log.from_disk else None, delay)
     passes.rows = known.rows
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:
@@ -122,7 +127,7 @@ def estimated(
     if (
         vehicle.sensors.ground_speed_delay is None
     ):  # of consecutive rows, which a sample of them does not hold
-        sensors = {DELAY: 0.0 if known.lag is None else known.lag.delay} | sensors
+        sensors = {DELAY: known.delay} | sensors
     estimator = TractionEstimator.for_recording(
         known.sample,
         vehicle,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.held import held_period
-from terragrip.recording.lag import Lag, is_copy, lag_within, measured
+from terragrip.recording.lag import Lag, delay_of, is_copy, lag_within, measured
 from terragrip.recording.noise import white_noise
 from terragrip.recording.survey import ROWS, first_speeds
 from terragrip.recording.table import Recording
@@ -34,8 +34,7 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
     time, columns = first_speeds(ahead)
     lag = lag_within(time, columns)
     if lag is None or not lag.is_to_set_right:
-        notes = [_doubt(lag)] if lag is not None and lag.is_of_the_clock else []
-        yield from (block.with_notes(*notes) if notes else block for block in chain(ahead, source))
+        yield from (_doubted(block, lag) for block in chain(ahead, source))
         return
     shift = _Shift.by(lag, time, columns)
     tail: list[Recording] = []
@@ -46,6 +45,21 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
         block = ahead.pop(0)
         yield shift.moved(block, [*tail, block, *ahead])
         tail = [b for b in (*tail, block) if b.time[-1] > block.time[-1] - shift.reach]
+
+
+def set_right(recording: Recording) -> tuple[Recording, float]:
+    """A whole recording as `aligned` yields it, and the SD [s] of what its ground speed is late by then, as `survey_of` finds it."""
+    time, columns = first_speeds([recording])
+    lag = lag_within(time, columns)
+    if lag is None or not lag.is_to_set_right:
+        return _doubted(recording, lag), delay_of(lag)
+    moved = _Shift.by(lag, time, columns).moved(recording, [recording])
+    return moved, delay_of(lag_within(*first_speeds([moved])))
+
+
+def _doubted(block: Recording, lag: Lag | None) -> Recording:
+    """A block with a note on a lag that is too uncertain to set right."""
+    return block.with_notes(_doubt(lag)) if lag is not None and lag.is_of_the_clock else block
 
 
 @dataclass(frozen=True)

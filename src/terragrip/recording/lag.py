@@ -159,6 +159,11 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
     return None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
 
 
+def delay_of(lag: Lag | None) -> float:
+    """`Lag.delay` [s] of what `lag_within` found; 0 where that is nothing."""
+    return 0.0 if lag is None else lag.delay
+
+
 def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
     """Whether a wheel's speed was computed from the ground speed, as for a free wheel without a sensor: it has the ground speed's lag."""
     known = np.isfinite(turning) & np.isfinite(ground)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
-from terragrip.recording.lag import Lag, lag_within
+from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.table import Recording
 
 Floats = npt.NDArray[np.float64]
@@ -51,13 +51,14 @@ class Survey:
     """The result of one pass over a log: the number of its ``rows``, and a ``sample`` of them spread over the whole log.
 
     ``sample`` has the channels with a value anywhere in the log, and all remarks of its reader (notes, noise).
-    ``empty``: the channels without any value; ``lag``: that of the ground speed in its first rows, None: they tell none.
+    ``empty``: the channels without any value; ``delay``: SD [s] of what the ground speed is late by, as its first rows tell; 0: they
+    tell nothing.
     """
 
     rows: int
     sample: Recording
     empty: tuple[str, ...]
-    lag: Lag | None = None
+    delay: float = 0.0
 
     def without_empty(self, block: Recording) -> Recording:
         """A block of the log without the channels that have no value anywhere."""
@@ -66,10 +67,11 @@ class Survey:
         return replace(block, channels={n: v for n, v in block.channels.items() if n not in self.empty})
 
 
-def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
+def survey_of(log: LogBlocks, progress: Progress | None = None, delay: float | None = None) -> Survey:
     """Read a log once; its sample is that of `sampled_rows`, whatever the blocks.
 
-    ``progress`` is called with the rows done. Raises InputError as reading the blocks does, and where there is no row.
+    ``progress`` is called with the rows done; ``delay``: where it is known already. Raises InputError as reading the
+    blocks does, and where there is no row.
     """
     kept: dict[int, list[Recording]] = {}
     holding: set[str] = set()
@@ -100,7 +102,9 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} holds no value and is left out." for name in empty]
-    result = Survey(rows, sample, empty, lag_within(*first_speeds(beginning)))
+    if delay is None:
+        delay = delay_of(lag_within(*first_speeds(beginning)))
+    result = Survey(rows, sample, empty, delay)
     return replace(result, sample=result.without_empty(sample).with_notes(*notes))
 
 
