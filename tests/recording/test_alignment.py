@@ -11,7 +11,7 @@ import pytest
 from terragrip.estimation import estimate
 from terragrip.estimation.noise import DELAY
 from terragrip.recording import Recording, alignment, survey
-from terragrip.recording.alignment import _Shift, aligned
+from terragrip.recording.alignment import _Shift, aligned, set_right
 from terragrip.recording.lag import Lag
 from terragrip.recording.survey import LogBlocks, survey_of
 from terragrip.simulation import families, simulate
@@ -125,13 +125,24 @@ def test_a_log_says_what_its_ground_speed_may_be_late_by() -> None:
     def delay(seconds: float) -> float:
         columns = {"ground_speed": np.interp(time - seconds, time, speed), "wheel_speed_l": 5 * speed}
         columns["wheel_speed_l"] += 0.01 * np.sin(7 * time)
-        lag = survey_of(LogBlocks.of(Recording.from_frame({"time": time, **columns}), 700)).lag
-        assert lag is not None
-        return lag.delay
+        return survey_of(LogBlocks.of(Recording.from_frame({"time": time, **columns}), 700)).delay
 
     explained = 1.7 / (2 * 9.80665)  # of which any part may be the vehicle's own
     assert delay(0.0) == pytest.approx(explained / np.sqrt(3), rel=0.3)
     assert delay(0.3) == pytest.approx(0.3 - explained / 2, rel=0.2)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.3])
+def test_a_whole_recording_is_set_right_as_blocks_are(seconds: float) -> None:
+    time = np.arange(0.0, 300.0, 0.1)
+    speed = 1.2 + 0.5 * np.sin(time / 5) + 0.2 * np.sin(time * 0.9)
+    columns = {"ground_speed": np.interp(time - seconds, time, speed), "wheel_speed_l": 5 * speed}
+    log = Recording.from_frame({"time": time, **columns})
+    moved, delay = set_right(log)
+    (by_blocks,) = aligned([log])
+    assert (moved.notes, delay) == (by_blocks.notes, survey_of(LogBlocks.of(by_blocks)).delay)
+    np.testing.assert_array_equal(moved.channels["ground_speed"], by_blocks.channels["ground_speed"])
+    assert bool(moved.notes) == (seconds > 0)
 
 
 def test_a_delay_that_is_stated_counts_before_what_the_log_tells() -> None:
