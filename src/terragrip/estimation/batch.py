@@ -124,9 +124,8 @@ def estimated(
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     track, said = turn_in(log, known.sample, vehicle)
     sensors = dict(options.sensors or {})
-    if (
-        vehicle.sensors.ground_speed_delay is None
-    ):  # of consecutive rows, which a sample of them does not hold
+    # By consecutive rows, which a sample of them does not hold.
+    if vehicle.sensors.ground_speed_delay is None:
         sensors = {DELAY: known.delay} | sensors
     estimator = TractionEstimator.for_recording(
         known.sample,
