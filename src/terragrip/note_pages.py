@@ -35,7 +35,7 @@ PAGES = (
     ("time may not be in seconds", "formats#in-a-profile"),
     ("angular_velocity_z turns with", "formats#in-a-profile"),
     ("a sensor that is dead", "formats#what-the-motion-contradicts"),
-    ("while other speeds change", "formats#what-the-motion-contradicts"),
+    ("while other ", "formats#what-the-motion-contradicts"),
     ("in turns backward", "formats#what-the-motion-contradicts"),
     ("its sensor is dead", "formats#what-the-motion-contradicts"),
     ("Columns that are not used", "formats#in-a-profile"),

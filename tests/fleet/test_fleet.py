@@ -21,8 +21,10 @@ from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.files import lock
+from terragrip.fleet.dataset import known_notes, settled, write_tables
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.run import FleetResult
+from terragrip.fleet.store import Store
 from terragrip.fleet.task import Outcome, _attempt
 from terragrip.ground.analysis import analyse
 
@@ -449,9 +451,30 @@ def test_a_log_with_estimates_is_no_failure(place: Path, ran: Ran) -> None:
     assert ran()[0] == 0
     table = pa.table({"log": ["drive0.csv"], "reason": ["its worker was lost"]})
     pq.write_table(table, place / "out/failures.parquet")
+    summary = pd.read_parquet(place / "out/summary.parquet")
+    summary[summary["log"] != "drive0.csv"].to_parquet(place / "out/summary.parquet")
     assert ran(place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")[0] == 0
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (6, {})
+
+
+def test_a_log_whose_worker_was_lost_keeps_its_earlier_estimates(place: Path, ran: Ran) -> None:
+    assert ran()[0] == 0
+    store = Store.at(str(place / "out"))
+    before, failed = known_notes(store)
+    lost = Outcome("drive0.csv", reason="no worker came back", worker_lost=True)
+    broken = Outcome("drive1.csv", reason="is no log")
+    notes, reasons = settled(store, before, failed, [lost, broken])
+    assert {note["log"] for note in notes} == {f"drive{k}.csv" for k in (0, 2, 3, 4, 5)}
+    assert reasons["drive0.csv"] == "no worker came back; its estimates of an earlier call are kept"
+    assert reasons["drive1.csv"] == "is no log"
+    write_tables(store, notes, reasons)
+    left = {path.name for path in (place / "out/estimates").rglob("*.parquet")}
+    assert "drive0.csv.parquet" in left
+    assert "drive1.csv.parquet" not in left
+    assert set(known_notes(store)[1]) == {"drive0.csv", "drive1.csv"}, "both run last in the next call"
+    assert "1 estimated, 5 unchanged, 0 failed" in ran()[1]
+    assert whole(place / "out")[1] == {}
 
 
 def test_what_every_log_would_fail_by_is_refused_and_loses_nothing(

@@ -132,7 +132,8 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         ("# only\n# comments\n", "is empty"),
         ("0,1,5\n1,1,5\n", "the first row holds numbers, not column names; put a header row"),
         (HEAD + GOOD_ROWS + "2,fast,5\n", "column ground_speed, row 3: 'fast' is not a number; leave the cell empty"),
-        (HEAD + GOOD_ROWS + "zwei,1,5\n", "column time, row 3: 'zwei' is not a number"),
+        (HEAD + GOOD_ROWS + "zwei,1,5\n", "column time, row 3: 'zwei' is not a number; give seconds, 10:00:00.5 or"),
+        (HEAD + "05:03.2,1,5\n05:03.4,1,5\n", "column time, row 1: '05:03.2' is not a number; give seconds, 10:00:00.5 or"),
         (HEAD + GOOD_ROWS + "2,1\n3,1,5\n", "row 3: has 2 cells, the header 3; give every row as many cells"),
         (HEAD + GOOD_ROWS + "2,1,5,6,7\n", "row 3: has 5 cells, the header 3"),
         (HEAD + GOOD_ROWS + "2,inf,5\n", "column ground_speed, row 3 (time 2 s): is infinite"),
@@ -297,6 +298,64 @@ def test_times_and_dates_as_loggers_write_them(tmp_path: Path, form: str, is_dat
     if name == "time" and is_date:
         assert np.allclose(read(path).time, np.arange(ROWS) / 10, atol=1e-6)
         assert inspect(path).time is not None
+
+
+def dated(path: Path, name: str, *days: str) -> Path:
+    rows = "".join(f"{day} 10:00:{k:02d}.5,{k},3\n" for k, day in enumerate(days))
+    path.write_text(f"{name},ground_speed,wheel_speed_l\n{rows}")
+    return path
+
+
+CHANNELS = {"ground_speed": "ground_speed", "wheel_speed_l": "wheel_speed_l"}
+
+
+@pytest.mark.parametrize("name", ["time", "Date"])
+@pytest.mark.parametrize(
+    ("days", "hours"), [(("12/04/2024", "13/04/2024"), 24), (("04-13-2024", "04-12-2024"), -24)]
+)
+def test_a_number_above_12_shows_the_day(
+    tmp_path: Path, name: str, days: tuple[str, str], hours: int
+) -> None:
+    columns = read_table(dated(tmp_path / "log.csv", name, *days)).columns
+    assert np.diff(columns[name]) / np.timedelta64(1, "s") == [3600 * hours + 1]
+
+
+@pytest.mark.parametrize("name", ["time", "Date"])
+def test_dates_that_do_not_show_the_day_are_refused_until_the_profile_says_it(
+    tmp_path: Path, name: str
+) -> None:
+    log = dated(tmp_path / "log.csv", name, "03/04/2024", "04/04/2024", "05/04/2024")
+    said = (
+        f"{log}: column {name}, row 1: '03/04/2024 10:00:00.5' may be the 3. of month 4 or the 4. of month 3"
+    )
+    for dates, expected in ((None, None), ("dd/mm/yyyy", 86_401.0), ("mm/dd/yyyy", 31 * 86_400 + 1.0)):
+        time = {"from": name, "zero": "first"} | ({} if dates is None else {"dates": dates})
+        profile = Profile.from_dict({"time": time, "channels": CHANNELS})
+        if expected is None:
+            with pytest.raises(InputError) as caught:
+                read(log, profile)
+            assert str(caught.value).startswith(said)
+            assert "'dates: dd/mm/yyyy' (or mm/dd/yyyy) for time" in str(caught.value)
+        else:
+            recording = read(log, profile)
+            assert recording.time[1] == pytest.approx(expected)
+            month = 4 if dates == "dd/mm/yyyy" else 3
+            assert datetime.fromtimestamp(recording.clock_zero, UTC).month == month
+    assert any("may be the 3. of month 4" in note for note in inspect(log).warnings)
+    if name == "time":
+        with pytest.raises(InputError, match=r"may be the 3\. of month 4"):
+            read(log)
+
+
+def test_dates_in_two_orders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="and other dates have day and month in different places"):
+        read(dated(tmp_path / "log.csv", "time", "13/04/2024", "04/14/2024"))
+
+
+def test_half_days(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time,ground_speed,wheel_speed_l\n11:59:59 AM,1,5\n12:00:00 PM,1,5\n01:00:00 PM,1,5\n")
+    assert np.array_equal(read(path).time, [43_199, 43_200, 46_800])
 
 
 def test_texts_that_are_no_times_stay_texts(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Speeds and accelerations that keep one value are named; what is held between samples, or stands, is left alone."""
+"""Speeds, accelerations and forces that keep one value are named; what is held between samples, or stands, is left alone."""
 
 from __future__ import annotations
 
@@ -52,6 +52,35 @@ def test_a_speed_that_is_held_between_its_samples_is_left_alone() -> None:
 
 def test_a_ground_speed_of_0_may_be_a_vehicle_that_is_stuck() -> None:
     assert frozen_warnings(repeated("ground_speed", 20.0, 40.0, 0.0)) == []
+
+
+def pulling(**changed: np.ndarray) -> Recording:
+    """The same drive with torques and a drawbar force."""
+    draws = np.random.default_rng(1001)
+    pull = 100 + 40 * np.sin(TIME / 3)
+    forces = {
+        n: pull + draws.standard_normal(len(TIME))
+        for n in ("drive_torque_l", "drive_torque_r", "drawbar_force")
+    }
+    return log(**(forces | changed))
+
+
+@pytest.mark.parametrize("name", ["drive_torque_l", "drawbar_force"])
+def test_a_torque_or_a_pull_that_is_repeated_is_named(name: str) -> None:
+    values = pulling().channels[name].copy()
+    assert frozen_warnings(pulling()) == []
+    rows = (TIME >= 20) & (TIME <= 30)
+    values[rows] = values[rows][0]
+    (note,) = frozen_warnings(pulling(**{name: values}))
+    assert note.startswith(f"{name} repeats")
+    assert "from 20 to 30 s while other torques change" in note
+
+
+@pytest.mark.parametrize("value", [0.0, 500.0])
+def test_a_torque_that_is_off_or_at_its_limit_is_left_alone(value: float) -> None:
+    values = pulling().channels["drive_torque_l"].copy()
+    values[(TIME >= 20) & (TIME <= 30)] = value
+    assert frozen_warnings(pulling(drive_torque_l=values)) == []
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Section as Stay
 from terragrip.report import ground_sections
 from terragrip.report.page import Page, Picture, Section, Table, render
-from terragrip.report.style import soil_color
+from terragrip.report.style import CSS_VARIABLES, PART_COLORS, SOIL_COLORS, soil_color, text_color
 
 NAMES = ("fine", "wet", "unknown")
 
@@ -179,6 +180,31 @@ def test_colour_blind_readers_tell_labels_apart(labels: list[str], eye: str) -> 
     colors = [seen(soil_color(name, labels), eye) for name in labels]
     apart = min(float(np.linalg.norm(a - b)) for i, a in enumerate(colors) for b in colors[:i])
     assert apart > 12
+
+
+def schemes() -> list[dict[str, str]]:
+    """Colours of the page's variables by name, in the light and the dark scheme."""
+    css = (files("terragrip.report") / "templates/page.css").read_text(encoding="utf-8")
+    return [
+        dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", part)) for part in css.split("prefers-color-scheme: dark")
+    ]
+
+
+@pytest.mark.parametrize("scheme", [0, 1], ids=["light", "dark"])
+def test_names_on_the_strip_can_be_read(scheme: int) -> None:
+    """4.5 is the least contrast of a text (WCAG 2.2, 1.4.3)."""
+    names = [*SOIL_COLORS, *PART_COLORS, *(f"field {i}" for i in range(30))]
+
+    def luminance(color: str) -> float:
+        color = schemes()[scheme][CSS_VARIABLES[color]] if color in CSS_VARIABLES else color
+        coded = np.array([int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+        linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    for name in names:
+        patch = soil_color(name, names)
+        low, high = sorted((luminance(patch), luminance(text_color(patch))))
+        assert (high + 0.05) / (low + 0.05) >= 4.5, (name, patch)
 
 
 def test_labels_have_colours_of_their_own() -> None:

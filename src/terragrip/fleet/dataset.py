@@ -1,4 +1,4 @@
-"""A fleet's tables: which logs are in the data set and which failed, each log once."""
+"""A fleet's tables: which logs are in the data set and which failed; in both is one whose worker was lost."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from terragrip.errors import InputError
 from terragrip.fleet.store import Store
 from terragrip.fleet.tally import COUNTED, MEANS
-from terragrip.fleet.task import NOTES, SAMPLES, Outcome
+from terragrip.fleet.task import NOTES, SAMPLES, Outcome, is_whole
 
 SUMMARY, FAILURES, BY_SOIL = "summary.parquet", "failures.parquet", "soils.parquet"
 SOILS, REPORT = "soils.json", "report.html"
@@ -45,8 +45,9 @@ def known_notes(store: Store, named: Collection[str] = ()) -> tuple[dict[str, No
         )
     if not by_name:
         _refuse_foreign(store)
-    failed = {row["log"]: row["reason"] for row in _read(store, FAILURES)}
-    return by_name, {log: reason for log, reason in failed.items() if log not in by_name}
+    # A worker that was lost may have stored the note before: such a log is no failure.
+    stored = {name for name, note in by_name.items() if note["key"] not in keys}
+    return by_name, {row["log"]: row["reason"] for row in _read(store, FAILURES) if row["log"] not in stored}
 
 
 def _refuse_foreign(store: Store) -> None:
@@ -83,7 +84,7 @@ def settled(
     """The notes and failures after a call; files that are no longer referenced are removed.
 
     Logs of earlier calls that this one did not name are kept. If a log was estimated differently or failed now, its old estimates are
-    removed.
+    removed; not so if its worker was lost, which says nothing of the log.
     """
     notes, reasons = dict(before), dict(failed)
     for one in outcomes:
@@ -93,6 +94,10 @@ def settled(
             notes[one.log] = one.note
         else:
             reasons[one.log] = one.reason or "unknown"
+            if one.worker_lost and old is not None and is_whole(old, store):
+                notes[one.log] = old
+                reasons[one.log] += "; its estimates of an earlier call are kept"
+                continue
         if old is not None and (one.note is None or old["key"] != one.note["key"]):
             _drop(store, old, keep=one.note)
     return [notes[name] for name in sorted(notes)], dict(sorted(reasons.items()))

@@ -46,7 +46,8 @@ class Settings:
 @dataclass(frozen=True)
 class Outcome:
     """The result of a log: its ``note`` (`make_note`), or the ``reason`` why it failed. ``disk_full``: its estimates did not fit on the
-    disk. ``fresh``: this call estimated it, in ``seconds`` including reading and writing.
+    disk. ``fresh``: this call estimated it, in ``seconds`` including reading and writing. ``worker_lost``: it failed with its worker, so
+    nothing is known of the log.
     """
 
     log: str
@@ -55,6 +56,7 @@ class Outcome:
     fresh: bool = False
     seconds: float = 0.0
     disk_full: bool = False
+    worker_lost: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ def _estimated(
     with fetched(log.url, staging) as source:
         key = key_of(log, source, settings)
         known = store.read(f"{NOTES}/{key}.json")
-        if known is not None and _is_whole(note := json.loads(known), store):
+        if known is not None and is_whole(note := json.loads(known), store):
             return Outcome(log.name, note)
         local, thin, note_file = (
             staging / f"{number}{end}" for end in (".parquet", "-sample.parquet", ".json")
@@ -161,7 +163,7 @@ def _estimated(
     return _Staged(log.name, note, tuple(files), time.monotonic() - began)
 
 
-def _is_whole(note: Mapping[str, Any], store: Store) -> bool:
+def is_whole(note: Mapping[str, Any], store: Store) -> bool:
     """Whether the files of a log still have the sizes that its note states."""
     sizes = note.get("bytes", {note["file"]: None})  # notes of older versions have none
     return all(

@@ -25,7 +25,7 @@ from terragrip.formats.signals import SAME, union
 from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
-from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, start_of, texts
+from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, stamps_of, start_of, texts
 from terragrip.recording.repeats import merged
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
@@ -133,7 +133,7 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
             return None
         if sum(_ways(one, log.names) for one in origin.chain) > 1:
             return None
-    if profile.rows is not None:
+    if profile.rows is not None or profile.time.dates is not None:
         return None
     stub = np.zeros(1)
     return bound(profile, replace(log, columns=dict.fromkeys(log.names, stub)))
@@ -161,7 +161,7 @@ def converted_block(profile: Profile, block: LogTable, first: Any) -> dict[str, 
 
 def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list[str]]:
     """The time base [s], when its zero was [s since 1970] if that is known, and the notes on it."""
-    stamps = log.columns[origin.column]
+    stamps = written = stamps_of(log.columns[origin.column], log.source, origin.column, origin.dates)
     notes: list[str] = []
     start = log.start
     if stamps.dtype.kind in "Mm":
@@ -172,7 +172,7 @@ def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list
             stamps = stamps.astype(np.int64) - np.int64(stamps[0])  # nanoseconds since 1970 need all 64 bits
         time = numbers(origin.column, stamps, None, log.source) * factor_to(origin.unit, "s")
         if start is None:
-            start = _since_1970(log.columns[origin.column], origin)
+            start = _since_1970(written, origin)
     if origin.zero == "first" and len(time):
         time = time - time[0]
     return time, start, notes

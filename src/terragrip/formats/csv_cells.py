@@ -11,9 +11,9 @@ import numpy.typing as npt
 from terragrip.errors import InputError
 from terragrip.formats.dialect import Dialect, split
 from terragrip.formats.table import from_arrow
-from terragrip.formats.written_times import times_of
 from terragrip.recording.schema import LABELS, TIME, is_channel
 from terragrip.thousands import complaint, is_grouped
+from terragrip.written_times import FORMS, doubt, times_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -154,6 +154,8 @@ def _numbers_of_texts(
     times = times_of(cells) if name == TIME or not (is_own or name in LABELS) else None
     if times is not None:
         return times
+    if name == TIME and doubt(cells) is not None:  # a profile may say how they are written
+        return np.array(cells, dtype=object)
     result = np.full(len(cells), np.nan)
     doubtful = _doubtful(cells, dialect.decimal)
     for row, cell in enumerate(cells):
@@ -161,7 +163,7 @@ def _numbers_of_texts(
         if number is not None:
             result[row] = number
         elif cell is not None and is_own:
-            raise _no_number(cell, f"column {name}, row {first + row + 1}", source)
+            raise _no_number(cell, name, first + row, source)
         else:
             return np.array(cells, dtype=object)
     return result
@@ -182,7 +184,8 @@ def _doubtful(cells: list[str | None], decimal: str) -> int | None:
     return signed[0] if signed and all(is_grouped(str(cells[row]), other) for row in signed) else None
 
 
-def _no_number(cell: str, place: str, source: str) -> InputError:
+def _no_number(cell: str, name: str, row: int, source: str) -> InputError:
     shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
-    problem, hint = complaint(cell) or (f"{shown} is not a number", "leave the cell empty or give a number")
-    return InputError(problem, file=source, place=place, hint=hint)
+    hint = FORMS if name == TIME else "leave the cell empty or give a number"
+    problem, hint = complaint(cell) or (f"{shown} is not a number", hint)
+    return InputError(problem, file=source, place=f"column {name}, row {row + 1}", hint=hint)

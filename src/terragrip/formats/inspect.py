@@ -29,6 +29,7 @@ from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
+from terragrip.written_times import doubt
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (
@@ -145,6 +146,7 @@ def inspect(
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
     quiet = silent(numbers, proposals, seen.units)
+    warnings += [] if seen.stamp is not None else seen.doubtful_dates()
     warnings += [*quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
@@ -243,6 +245,12 @@ class Seen:
         numbers = self.numbers()
         clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
         return propose(numbers, self.texts(), self.units, clocks, vocabulary, vehicle)
+
+    def doubtful_dates(self) -> list[str]:
+        """Sentences on columns of dates that do not show which number is the day."""
+        cells = {name: column.tolist() for name, column in self.texts().items()}
+        found = {name: doubt([c if isinstance(c, str) else None for c in own]) for name, own in cells.items()}
+        return [f"column {name}: {one[1]}; {one[2]}" for name, one in found.items() if one is not None]
 
     def texts(self) -> dict[str, npt.NDArray[Any]]:
         """The text columns."""

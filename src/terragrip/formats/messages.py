@@ -27,7 +27,8 @@ BLOCK = 1000
 """Messages that are read or left out together, where a log is looked at in parts."""
 _OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock is another one
 _TRIED = 20  # messages without a wanted field after which a topic has none: the first may be empty
-_QUICKEST = 0.05  # quantile of the delay that counts as no delay
+_QUICKEST = 0.05  # quantile of the delay that counts as no delay, and share of stamps that may be far from it
+_BURST = 0.1  # of the time between two stamps: receipts that are closer came late, together
 
 Parts = Callable[[Any], Iterable[tuple[str, Any]]]
 """Gives a message's fields as (name, value), or nothing for a value that is no message."""
@@ -152,6 +153,12 @@ class Topic:
             return receipts, []
         delay = receipts - stamps
         typical = float(np.median(delay))
+        far = np.abs(delay - typical) > _OTHER_CLOCK
+        if far.mean() > _QUICKEST and not _in_bursts(receipts, stamps):
+            apart = float(np.ptp(delay))
+            return receipts, [
+                f"{self.name}: its stamps wander by {apart:.3g} s against the recorder's clock; the times of receipt are used."
+            ]
         if abs(typical) <= _OTHER_CLOCK:
             return stamps, []
         offset = float(np.quantile(delay, _QUICKEST))
@@ -205,6 +212,12 @@ class Topic:
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):
             self._walk(value, (*path, k if named is None else named[k]), fields, None)
+
+
+def _in_bursts(receipts: np.ndarray, stamps: np.ndarray) -> bool:
+    """Whether messages (n,) waited for each other on their way, so that the stamps say better when they were sent."""
+    usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    return usual > 0 and float(np.mean(np.diff(receipts) < _BURST * usual)) > _QUICKEST
 
 
 def _at(message: Any, path: Path, field_of: Callable[[Any, str], Any]) -> Any:

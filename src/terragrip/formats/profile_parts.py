@@ -129,11 +129,12 @@ class Source(Part):
 
 
 class TimeSource(Part):
-    """The column of the stamps, its unit, and whether time begins with 0 at the first row."""
+    """The column of the stamps, its unit, whether time begins with 0 at the first row, and how dates are written."""
 
     column: str = Field(TIME, alias="from")
     unit: str = "s"
     zero: Literal["first"] | None = None
+    dates: Literal["dd/mm/yyyy", "mm/dd/yyyy"] | None = None
 
     @field_validator("unit")
     @classmethod

@@ -12,6 +12,7 @@ from terragrip.errors import InputError
 from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
+from terragrip.written_times import doubt, times_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -85,15 +86,40 @@ def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:
     return 0.0 if len(time) and time[0] > SINCE_1970 else None
 
 
-def seconds(column: npt.NDArray[Any], source: str | None) -> tuple[Floats, list[str]]:
-    """The time column [s], with a note where dates became seconds since the first."""
+def seconds(column: npt.NDArray[Any], source: str | None, name: str = TIME) -> tuple[Floats, list[str]]:
+    """The time column [s], with a note where dates became seconds since the first; ``name``: what the log calls it.
+
+    Raises InputError at a text that is no time, and where dates do not show which number is the day.
+    """
+    column = stamps_of(column, source, name)
     if column.dtype.kind == "m":
         return np.where(np.isnat(column), np.nan, column / np.timedelta64(1, "s")), []
     if column.dtype.kind != "M":
-        return numbers(TIME, column, None, source), []
+        return numbers(name, column, None, source), []
     since = column - column[0] if len(column) else column.astype("timedelta64[ns]")
     result = np.where(np.isnat(since), np.nan, since / np.timedelta64(1, "s"))
     return result.astype(np.float64), ["time was a date; it counts seconds from the first row."]
+
+
+def stamps_of(
+    column: npt.NDArray[Any], source: str | None, name: str = TIME, order: str | None = None
+) -> npt.NDArray[Any]:
+    """A time column whose texts are times of day [s] or dates; others as they are. ``order`` as for `times_of`.
+
+    Raises InputError where dates do not show which number is the day.
+    """
+    if column.dtype.kind not in "OUT":
+        return column
+    cells = [cell if isinstance(cell, str) else None for cell in column.tolist()]
+    times = times_of(cells, order)
+    if times is not None:
+        return times
+    doubtful = doubt(cells)
+    if doubtful is not None:
+        row, problem, hint = doubtful
+        page = "formats#in-a-profile"
+        raise InputError(problem, file=source, place=place(name, row), hint=hint, page=page)
+    return column
 
 
 def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) -> npt.NDArray[np.object_]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
 
@@ -15,11 +16,13 @@ _LONG = 5.0  # s that a value may be repeated
 _TIMES = 20.0  # ... and of its usual repetition
 _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: what they change meanwhile
 _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
+_LOOKS = 8  # within `_LONG`: a value that is repeated for so long stands at half of them in succession
+_FEW = 4000  # rows that show how far rows are apart
 
 
 def frozen_warnings(recording: Recording) -> list[str]:
-    """Sentences on a ground speed or an acceleration that never changes while the wheels do, and on speeds that repeat a value for long,
-    as a receiver does that lost its fix, or a logger whose bus went silent."""
+    """Sentences on a ground speed or an acceleration that never changes while the wheels do, and on speeds, torques and a drawbar force
+    that repeat a value for long, as a receiver does that lost its fix, or a logger whose bus went silent."""
     speeds = _speeds(recording)
     ground = recording.channels.get("ground_speed")
     rims = [name for name in speeds if name != "ground_speed"]
@@ -44,6 +47,13 @@ def frozen_warnings(recording: Recording) -> list[str]:
             speeds[one] for one in (["ground_speed"] if name != "ground_speed" else rims) if one in speeds
         ]
         notes += _repeats(name, recording.time, speeds[name], others)
+    torques = {n: v for n, v in recording.channels.items() if n.startswith("drive_torque_")}
+    for name, values in torques.items():
+        others = [other for one, other in torques.items() if one != name]
+        notes += _repeats(name, recording.time, values, others, forces=True)
+    if "drawbar_force" in recording.channels:
+        pull = recording.channels["drawbar_force"]
+        notes += _repeats("drawbar_force", recording.time, pull, list(torques.values()), forces=True)
     return notes
 
 
@@ -66,17 +76,25 @@ def _range(values: Floats) -> float:
     return float(np.ptp(known)) if len(known) else 0.0
 
 
-def _repeats(name: str, time: Floats, values: Floats, others: list[Floats]) -> list[str]:
-    """A sentence on the longest run of one value, other than 0, while others change much."""
+def _repeats(
+    name: str, time: Floats, values: Floats, others: list[Floats], *, forces: bool = False
+) -> list[str]:
+    """A sentence on the longest run of one value while others change much. Speeds that are 0 may stand; ``forces`` that are 0 may be
+    switched off, and at their limits be as great as they can."""
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) < 3 or _is_one_value(values):
+    if len(known) < 3 or not others:
         return []
     when, what = time[known], values[known]
+    if not _may_last(when, what) or _is_one_value(what):
+        return []
     first = np.flatnonzero(np.r_[True, np.diff(what) != 0.0])
     last = np.r_[first[1:], len(what)] - 1
     lasting = when[last] - when[first]
     usual = float(np.median(np.diff(when[first]))) if len(first) > 2 else np.inf
-    long = (lasting >= max(_LONG, _TIMES * usual)) & (what[first] != 0.0)
+    usable = what[first] != 0.0
+    if forces:
+        usable &= (what[first] > what.min()) & (what[first] < what.max())
+    long = (lasting >= max(_LONG, _TIMES * usual)) & usable
     found = [
         (float(lasting[k]), float(when[first[k]]), float(what[first[k]]))
         for k in np.flatnonzero(long)
@@ -88,8 +106,18 @@ def _repeats(name: str, time: Floats, values: Floats, others: list[Floats]) -> l
     return [
         f"{name} repeats {value:.4g} from {start:.4g} to {start + seconds:.4g} s"
         + (f", and {len(found) - 1} times more," if len(found) > 1 else "")
-        + " while other speeds change: no measurement, it seems. Leave these cells empty: the intervals then show how little is known."
+        + f" while other {'torques' if forces else 'speeds'} change: no measurement, it seems. Leave these cells empty: the intervals "
+        "then show how little is known."
     ]
+
+
+def _may_last(when: Floats, what: Floats) -> bool:
+    """Whether a value may be repeated for `_LONG`: a quick look at some of the samples (n,)."""
+    every = max(1, len(when) // _FEW)
+    step = float(np.quantile(np.diff(when[::every]), 0.95)) / every
+    alike = np.diff(what[:: max(1, int(_LONG / _LOOKS / max(step, 1e-9)))]) == 0.0
+    least = _LOOKS // 2 - 1
+    return len(alike) >= least and bool(sliding_window_view(alike, least).all(axis=1).any())
 
 
 def _changes(other: Floats, rows: Bools) -> bool:

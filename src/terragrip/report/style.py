@@ -43,8 +43,8 @@ __all__ = [
     "styled",
 ]
 
-ON_COLOR = "#101214"
-"""Text on a patch of the palette, in either scheme."""
+_DARK, _LIGHT = "#000000", "#fdfdfd"
+"""Text on a patch whose colour is the same in either scheme."""
 
 MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 """Colours of the three sources of a value in every figure: the reference sensor, the estimate, the truth."""
@@ -128,6 +128,22 @@ def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
     if place < len(_SPARE_COLORS):
         return _SPARE_COLORS[place]
     return _made(place - len(_SPARE_COLORS))
+
+
+def text_color(patch: str) -> str:
+    """The colour of a text on a patch of a `soil_color`: what stands off more. A colour that follows the page's scheme is light in the
+    dark one, as paper is dark there."""
+    on_dark, on_light = (_luminance(patch) + 0.05) / 0.05, 1.05 / (_luminance(patch) + 0.05)
+    if on_dark >= on_light:
+        return _DARK
+    return PAPER if patch in CSS_VARIABLES else _LIGHT
+
+
+def _luminance(color: str) -> float:
+    """Relative luminance of #rrggbb (WCAG 2.2)."""
+    coded = [int(color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in coded]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
 def _made(number: int) -> str:

@@ -16,11 +16,11 @@ from terragrip.report.style import (
     INK,
     MEASURED,
     MUTED,
-    ON_COLOR,
     TRUE,
     new_figure,
     soil_color,
     styled,
+    text_color,
     to_svg,
 )
 
@@ -91,11 +91,12 @@ def soil_strip(plot: Axes, time: Floats, soil: NDArray[np.object_], soils: tuple
     result = [(label, float(time[a]), float(time[b])) for label, a, b in label_stretches(soil)]
     roomy = all((end - start) / span > 0.011 * len(label) + 0.01 for label, start, end in result)
     for label, start, end in result:
-        plot.broken_barh([(start, end - start)], (1.015, 0.055), facecolor=soil_color(label, soils), **bar)
+        color = soil_color(label, soils)
+        plot.broken_barh([(start, end - start)], (1.015, 0.055), facecolor=color, **bar)
         if roomy:
             plot.text(
                 (start + end) / 2, 1.0405, label,
-                transform=across, ha="center", va="center", fontsize=7.5, color=ON_COLOR,
+                transform=across, ha="center", va="center", fontsize=7.5, color=text_color(color),
             )  # fmt: skip
     return roomy
 

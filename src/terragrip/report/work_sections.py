@@ -10,7 +10,7 @@ import numpy as np
 from terragrip.report.blocks import BAND_NAMES, Blocks, Share, share_of, shares
 from terragrip.report.field_work import PARTS, STANDING
 from terragrip.report.page import Picture, Section, Table, number, percent
-from terragrip.report.style import GRID, INK, new_figure, styled, to_svg
+from terragrip.report.style import GRID, INK, new_figure, styled, text_color, to_svg
 
 HOUR, QUARTER = 3600.0, 900.0
 LONG = 2.5 * HOUR
@@ -78,8 +78,9 @@ def draw_bands(result: Sequence[Share]) -> str:
     figure = new_figure(9.6, 0.9 + 0.45 * len(result))
     with styled():
         from matplotlib import colormaps
+        from matplotlib.colors import to_hex
 
-        colors = colormaps["cividis"](np.linspace(0.0, 1.0, len(BAND_NAMES)))
+        colors = [to_hex(c) for c in colormaps["cividis"](np.linspace(0.0, 1.0, len(BAND_NAMES)))]
         plot = figure.subplots()
         left = np.zeros(len(result))
         height = [one.label for one in result]
@@ -90,10 +91,9 @@ def draw_bands(result: Sequence[Share]) -> str:
             )
             for bar, value in zip(bars, share, strict=True):
                 if value >= 6:
-                    light = colors[i][:3].mean() > 0.5
                     plot.text(
                         bar.get_x() + value / 2, bar.get_y() + bar.get_height() / 2, f"{value:.0f}",
-                        ha="center", va="center", fontsize=8, color="#101214" if light else "#ffffff",
+                        ha="center", va="center", fontsize=8, color=text_color(colors[i]),
                     )  # fmt: skip
             left += share
         plot.invert_yaxis()

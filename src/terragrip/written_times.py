@@ -1,0 +1,121 @@
+"""Instants that a table holds as text: times of day, and dates in the forms that loggers and spreadsheets write."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,](?P<part>\d{1,9}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+_TIME = re.compile(_CLOCK)
+_NAMED = (
+    re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}),?[ T]+{_CLOCK}"),
+    re.compile(rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}Z?"),
+)
+_EITHER = re.compile(
+    rf"(?P<one>\d{{1,2}})(?P<sign>[/-])(?P<two>\d{{1,2}})(?P=sign)(?P<year>\d{{4}}),?[ T]+{_CLOCK}"
+)
+"""Day and month, or month and day."""
+_DAY = 86_400.0
+
+ORDERS = ("dd/mm/yyyy", "mm/dd/yyyy")
+"""How a date may be written whose text alone does not tell."""
+FORMS = "give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5"
+"""What a time may be written as, for a message."""
+
+
+def times_of(
+    cells: Sequence[str | None], order: str | None = None
+) -> npt.NDArray[np.float64] | npt.NDArray[np.datetime64] | None:
+    """Times of day as seconds (n,), dates with them as datetime64 (n,); None where some cell is neither, or they differ in form.
+
+    A time of day that runs back by more than half a day is of the next day. Empty cells are missing. 13/04/2024 shows which number is
+    the day, for all cells; where none does, ``order``, of `ORDERS`, says it, and without it the dates are none.
+    """
+    matches = _matches(cells)
+    if matches is None:
+        return None
+    groups = next(m for m in matches if m is not None).re.groupindex
+    try:
+        seconds = np.array([np.nan if match is None else _seconds(match) for match in matches])
+        if "year" not in groups:
+            return _without_midnights(seconds)
+        if "one" in groups:
+            order = order or _order(matches)
+            if order is None:
+                return None
+        days = np.array([_day(match, order) for match in matches], dtype="datetime64[D]")
+    except ValueError:  # a thirteenth month, or hour of a half day
+        return None
+    since = np.where(np.isnan(seconds), 0.0, seconds)
+    return days + np.round(since * 1e9).astype("timedelta64[ns]")
+
+
+def doubt(cells: Sequence[str | None]) -> tuple[int, str, str] | None:
+    """The place of a date that does not show which number is the day, what is wrong, and what to write; None where none is among
+    ``cells``, or all are shown by one of them."""
+    matches = _matches(cells)
+    if matches is None:
+        return None
+    rows = [row for row, match in enumerate(matches) if match is not None]
+    if "one" not in matches[rows[0]].re.groupindex or _order(matches) is not None:  # type: ignore[union-attr]
+        return None
+    row = rows[0]
+    cell, (one, two) = str(cells[row]).strip(), _pair(matches[row])
+    if one > 12 or two > 12:
+        problem = f"{cell!r} and other dates have day and month in different places"
+        return row, problem, "write all dates alike, as 2024-04-03"
+    problem = f"{cell!r} may be the {one}. of month {two} or the {two}. of month {one}"
+    return row, problem, f"write 2024-04-03, or in a profile 'dates: {ORDERS[0]}' (or {ORDERS[1]}) for time"
+
+
+def _matches(cells: Sequence[str | None]) -> list[re.Match[str] | None] | None:
+    """The cells by the form of the first that is not empty, None for an empty one; None altogether where one has another form."""
+    first = next((cell for cell in cells if cell), None)
+    forms = (_TIME, *_NAMED, _EITHER)
+    form = next((f for f in forms if first is not None and f.fullmatch(first.strip())), None)
+    if form is None:
+        return None
+    matches = [form.fullmatch(cell.strip()) if cell else None for cell in cells]
+    return (
+        None if any(match is None and cell for match, cell in zip(matches, cells, strict=True)) else matches
+    )
+
+
+def _order(matches: Sequence[re.Match[str] | None]) -> str | None:
+    """The order of day and month that a number above 12 shows; None where none does, or one in each place."""
+    pairs = np.array([_pair(match) for match in matches if match is not None])
+    one, two = (bool((pairs[:, k] > 12).any()) for k in (0, 1))
+    return None if one == two else ORDERS[0] if one else ORDERS[1]
+
+
+def _pair(match: re.Match[str] | None) -> tuple[int, int]:
+    return (0, 0) if match is None else (int(match["one"]), int(match["two"]))
+
+
+def _seconds(match: re.Match[str]) -> float:
+    part, hour, half = match["part"] or "0", int(match["hour"]), match["half"]
+    if half:
+        if not 1 <= hour <= 12:
+            raise ValueError("no hour of a half day")
+        hour = hour % 12 + 12 * (half in "Pp")
+    return 3600 * hour + 60 * int(match["minute"]) + int(match["second"]) + int(part) / 10 ** len(part)
+
+
+def _day(match: re.Match[str] | None, order: str | None) -> str:
+    if match is None:
+        return "NaT"
+    if "one" in match.re.groupindex:
+        day, month = _pair(match) if order == ORDERS[0] else _pair(match)[::-1]
+    else:
+        day, month = int(match["day"]), int(match["month"])
+    return f"{match['year']}-{month:02d}-{day:02d}"
+
+
+def _without_midnights(seconds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    known = np.isfinite(seconds)
+    days = np.zeros(len(seconds))
+    days[known] = np.cumsum(np.diff(seconds[known], prepend=seconds[known][:1]) < -_DAY / 2)
+    return seconds + _DAY * days
