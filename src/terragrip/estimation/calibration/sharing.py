@@ -274,7 +274,7 @@ def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Int
     np.add.at(scores, code, score)
     information = np.zeros((count, size, size))
     np.add.at(information, code, np.einsum("nwp,nwq->npq", jacobian, jacobian))
-    shifts = np.array([_inverse(normal - own) @ g for own, g in zip(information, scores, strict=True)])
+    shifts = (_inverse(normal - information) @ scores[..., None])[..., 0]
     inverse = _inverse(normal)
     return np.asarray(shifts.T @ shifts * (count - 1) / count + inverse @ prior @ inverse)
 
@@ -291,7 +291,11 @@ def effective_blocks(normal: Floats, jacobian: Floats, block: Ints, unknown: int
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive semidefinite matrix after scaling its diagonal to 1; what is not determined stays 0."""
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True, rcond=1e-13)
-    return np.asarray(inverse / np.outer(size, size))
+    """Inverses (..., p, p) of positive semidefinite matrices after scaling their diagonals to 1; what is not determined stays 0."""
+    size = np.sqrt(np.maximum(np.diagonal(matrix, axis1=-2, axis2=-1), 1e-300))
+    scale = size[..., :, None] * size[..., None, :]
+    values, vectors = np.linalg.eigh(matrix / scale)
+    known = np.abs(values) > 1e-13 * np.abs(values).max(axis=-1, keepdims=True)
+    rooted = np.divide(1.0, values, where=known, out=np.zeros_like(values))
+    inverse = (vectors * rooted[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return np.asarray(inverse / scale)

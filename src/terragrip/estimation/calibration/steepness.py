@@ -47,42 +47,44 @@ def steepness_of(
     soils = int(soil.max()) + 1
     top = np.array([np.quantile(size[soil == j], _TOP) if np.any(soil == j) else 0.0 for j in range(soils)])
     repeats = len(level) / len(np.unique(block))
-    forms, losses = [], []
-    for room in _ROOM:
-        ceiling = (room * np.maximum(top, _LEAST_LEVEL))[soil]
-        share = np.minimum(size / ceiling, 0.98)
-        loss, inverse, deviation = _regressed(
-            -ceiling * np.log1p(-share), signed, soil, np.sign(level), slip_std, repeats
-        )
-        forms.append(((1 - share) / inverse[soil], deviation))
-        losses.append(loss)
+    ceiling = _ROOM[:, None] * np.maximum(top, _LEAST_LEVEL)[soil]
+    share = np.minimum(size / ceiling, 0.98)
+    losses, inverse, deviation = _regressed(
+        -ceiling * np.log1p(-share), signed, soil, np.sign(level), slip_std, repeats
+    )
     fits = len(np.unique(block)) * np.log(np.maximum(losses, 1e-9))
     chance = np.exp(np.min(fits) - fits)
-    steepness, deviation = forms[int(np.argmax(chance)) if form is None else form]
-    return Steepness(steepness, deviation, chance / chance.sum())
+    taken = int(np.argmax(chance)) if form is None else form
+    steepness = (1 - share[taken]) / inverse[taken, soil]
+    return Steepness(steepness, float(deviation[taken]), chance / chance.sum())
 
 
 def _regressed(
     form: Floats, slip: Floats, soil: Ints, sign: Floats, slip_std: float, repeats: float
-) -> tuple[float, Floats, float]:
-    """The robust loss, x_j (soils,), and the relative SD of their mean."""
+) -> tuple[Floats, Floats, Floats]:
+    """For forms (m, n) of the levels: the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means."""
     soils = int(soil.max()) + 1
-    design = np.zeros((len(slip), soils + 1))
-    design[np.arange(len(slip)), soil] = form
-    design[:, -1] = sign
+    design = np.zeros((*form.shape, soils + 1))
+    design[:, np.arange(len(slip)), soil] = form
+    design[..., -1] = sign
+    turned = np.ascontiguousarray(np.swapaxes(design, 1, 2))
     center = np.r_[np.full(soils, _PRIOR[0]), 0.0]
     precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), max(slip_std, 1e-6) ** -2.0]
-    values, weight, noise = center.copy(), np.ones(len(slip)), 0.0
-    covariance = np.diag(1 / precision)
+    values = np.tile(center, (len(form), 1))
     for _ in range(_ROUNDS):
-        rest = slip - design @ values
-        noise = max(1.4826 * float(np.median(np.abs(rest))), 1e-4)
-        weight = np.minimum(1.0, _HUBER * noise / np.maximum(np.abs(rest), 1e-12)) / (noise**2 * repeats)
-        normal = design.T @ (weight[:, None] * design) + np.diag(precision)
-        covariance = np.linalg.inv(normal)
-        values = covariance @ (design.T @ (weight * slip) + precision * center)
-    inverse = np.clip(values[:-1], _LEAST, _MOST)
+        rest = np.abs(slip - _times(design, values))
+        noise = np.maximum(1.4826 * np.median(rest, axis=1, keepdims=True), 1e-4)
+        weight = np.minimum(1.0, _HUBER * noise / np.maximum(rest, 1e-12)) / (noise**2 * repeats)
+        covariance = np.linalg.inv((turned * weight[:, None, :]) @ design + np.diag(precision))
+        values = _times(covariance, _times(turned, weight * slip) + precision * center)
+    inverse = np.clip(values[:, :-1], _LEAST, _MOST)
     counts = np.bincount(soil, minlength=soils) / len(soil)
-    mean = float(counts @ inverse)
-    loss = float(np.mean(np.abs(slip - design[:, :-1] @ inverse - sign * values[-1])))
-    return loss, inverse, float(np.sqrt(counts @ covariance[:-1, :-1] @ counts)) / mean
+    bounded = np.column_stack([inverse, values[:, -1]])
+    loss = np.mean(np.abs(slip - _times(design, bounded)), axis=1)
+    spread = np.sqrt(counts @ covariance[:, :-1, :-1] @ counts)
+    return loss, inverse, spread / (inverse @ counts)
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """Each matrix (m, n, p) times its vector (m, p)."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])
