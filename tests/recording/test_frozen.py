@@ -76,11 +76,50 @@ def test_a_torque_or_a_pull_that_is_repeated_is_named(name: str) -> None:
     assert "from 20 to 30 s while other torques change" in note
 
 
-@pytest.mark.parametrize("value", [0.0, 500.0])
-def test_a_torque_that_is_off_or_at_its_limit_is_left_alone(value: float) -> None:
-    values = pulling().channels["drive_torque_l"].copy()
-    values[(TIME >= 20) & (TIME <= 30)] = value
-    assert frozen_warnings(pulling(drive_torque_l=values)) == []
+def test_a_torque_at_its_limit_and_an_axle_that_is_off_are_left_alone() -> None:
+    rows = (TIME >= 20) & (TIME <= 30)
+    left, right = (pulling().channels[f"drive_torque_{side}"].copy() for side in "lr")
+    assert frozen_warnings(pulling(drive_torque_l=np.where(rows, 500.0, left))) == []
+    off = {"drive_torque_l": np.where(rows, 0.0, left), "drive_torque_r": np.where(rows, 0.0, right)}
+    assert frozen_warnings(pulling(**off)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [("drive_torque_l", "while all other torques are not"), ("wheel_speed_l", "while the vehicle drives")],
+)
+def test_a_channel_that_alone_drops_to_0_is_named(name: str, what: str) -> None:
+    values = np.where((TIME >= 20) & (TIME <= 30), 0.0, pulling().channels[name])
+    (note,) = frozen_warnings(pulling(**{name: values}))
+    assert note.startswith(f"{name} is 0 from 20 to 30 s {what}")
+    assert (
+        frozen_warnings(
+            pulling(**{name: np.where((TIME >= 20) & (TIME <= 24), 0.0, pulling().channels[name])})
+        )
+        == []
+    )
+
+
+def test_a_logger_that_hung_is_named_and_a_gap_is_no_repetition() -> None:
+    drive = pulling()
+    rows = (TIME >= 20) & (TIME <= 30)
+    held = {name: np.where(rows, values[rows][0], values) for name, values in drive.channels.items()}
+    notes = frozen_warnings(pulling(**held))
+    assert notes == [
+        note for note in notes if note.startswith("All channels keep their values from 20.1 to 30 s")
+    ]
+    assert notes
+    two = drive.select(np.flatnonzero(~rows | (TIME == 20) | (TIME == 30)))
+    speed = two.channels["wheel_speed_l"].copy()
+    speed[(two.time == 20) | (two.time == 30)] = 3.33
+    assert frozen_warnings(two.with_channels(wheel_speed_l=speed)) == []
+
+
+def test_a_ground_speed_in_coarse_steps_is_named() -> None:
+    """Of 2 km/h."""
+    coarse = np.round(3.6 * log().channels["ground_speed"] / 2) * 2 / 3.6
+    (note,) = frozen_warnings(log(ground_speed=coarse))
+    assert note.startswith("ground_speed comes in steps of 0.556, where 2.22 is fast")
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ import pytest
 
 from terragrip.recording import Recording
 from terragrip.recording.mechanics import (
+    Fit,
     Means,
     _balance_warnings,
     _dead_warnings,
-    _Fit,
     _radius_warnings,
     _scale_sentence,
     _thrust_warnings,
@@ -54,15 +54,15 @@ def windows(n: int, climb: np.ndarray | None = None) -> Means:
 def test_a_slope_is_another_one_beyond_three_errors_and_what_noise_flattens(
     slope: float, error: float, alike: float, off: bool, another: bool
 ) -> None:
-    fit = _Fit(slope, error, alike)
+    fit = Fit(slope, error, alike)
     assert (fit.is_off(), fit.is_another_scale) == (off, another)
 
 
 def test_how_far_a_slope_is_from_one_is_a_factor() -> None:
-    assert _Fit(4.0).distance == pytest.approx(np.log(4.0)) == _Fit(0.25).distance
-    assert _Fit(-4.0).distance == np.inf
-    assert _Fit(0.0).distance == np.inf
-    assert _Fit() == _Fit(0.0, np.inf, 0.0)
+    assert Fit(4.0).distance == pytest.approx(np.log(4.0)) == Fit(0.25).distance
+    assert Fit(-4.0).distance == np.inf
+    assert Fit(0.0).distance == np.inf
+    assert Fit() == Fit(0.0, np.inf, 0.0)
 
 
 def test_means_of_windows_with_holes() -> None:
@@ -98,12 +98,12 @@ def test_slope_and_error_are_those_of_a_regression_and_a_jackknife(climbing: boo
 def test_under_25_windows_or_without_change_nothing_is_fitted() -> None:
     x = np.arange(25.0)
     assert windows(25).fit(2 * x, x).slope == pytest.approx(2.0)
-    assert windows(24).fit(2 * x[:24], x[:24]) == _Fit()
-    assert windows(25).fit(np.ones(25), x) == _Fit()
-    assert windows(25).fit(x, np.ones(25)) == _Fit()
+    assert windows(24).fit(2 * x[:24], x[:24]) == Fit()
+    assert windows(25).fit(np.ones(25), x) == Fit()
+    assert windows(25).fit(x, np.ones(25)) == Fit()
     climb = np.where(x == 3, np.nan, x**2)
     assert windows(25, climb).fit(2 * x, x).slope == pytest.approx(2.0)
-    assert windows(25, climb).fit(2 * x, x, beside_climb=True) == _Fit()
+    assert windows(25, climb).fit(2 * x, x, beside_climb=True) == Fit()
 
 
 @pytest.mark.parametrize(("step", "length"), [(0.1, 1.0), (0.5, 1.0), (1.0, 2.0)])
@@ -198,8 +198,8 @@ def test_an_accelerometer_alone_is_backward_from_three_errors_below_none(
     slope: float, opposite: bool
 ) -> None:
     class Fits(Means):
-        def fit(self, *values: Any, **options: Any) -> _Fit:
-            return _Fit(slope, 0.1, -0.5)
+        def fit(self, *values: Any, **options: Any) -> Fit:
+            return Fit(slope, 0.1, -0.5)
 
     means = Fits(np.arange(3), 3, np.ones(3, dtype=bool), np.zeros(3), np.ones(3), None)
     notes = _balance_warnings(Recording(np.arange(3.0), {}), means, np.zeros(3), {}, None)

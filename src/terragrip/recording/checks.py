@@ -20,6 +20,7 @@ Floats = npt.NDArray[np.float64]
 MASSES = (0.2, 10.0)
 """What a measured mass may be of the vehicle file's; the kernel passes over others (loads.c)."""
 
+_ROUNDED = 0.2  # of the stamps repeat the one before: no slip of a logger, but all of its stamps
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 
@@ -137,7 +138,13 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
         )
     row = int(np.argmin(forward))
     last = before if row == 0 else time[row - 1]
-    if time[row] == last:
+    again = float(np.mean(np.diff(time) == 0))
+    if time[row] == last and again > _ROUNDED:
+        problem = (
+            f"time repeats, as {again:.0%} of the stamps here do: they are rounded, or kept in too few digits"
+        )
+        hint = "write time with more digits"
+    elif time[row] == last:
         problem, hint = "time repeats", "keep one row an instant"
     else:
         problem, hint = f"time runs back from {last:.10g} s", "sort the rows, or split the log there"

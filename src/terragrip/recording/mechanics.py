@@ -46,7 +46,7 @@ _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
 @dataclass(frozen=True)
-class _Fit:
+class Fit:
     """Slope with its standard error, and the correlation; a slope of 0 ± inf where there are too few data."""
 
     slope: float = 0.0
@@ -91,14 +91,14 @@ class Means:
         inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
         return np.r_[np.nan, inner, np.nan][self.rows]
 
-    def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> _Fit:
+    def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> Fit:
         """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: without the effect of climbs."""
         known = np.isfinite(y) & np.isfinite(x)
         other = self.climb if beside_climb else None
         if other is not None:
             known &= np.isfinite(other)
         if known.sum() < _LEAST or not np.ptp(y[known]) or not np.ptp(x[known]):
-            return _Fit()
+            return Fit()
         pair = np.column_stack([y, x])[known]
         common = np.column_stack([np.ones(len(pair)), *(() if other is None else (other[known],))])
         pair = pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]
@@ -106,7 +106,7 @@ class Means:
         whole = _ratio(pair)
         without = np.array([_ratio(pair[block != k]) for k in range(_BLOCKS)])
         error = float(np.sqrt((_BLOCKS - 1) * np.var(without)))
-        return _Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else _Fit()
+        return Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else Fit()
 
 
 def motion_warnings(
@@ -221,7 +221,7 @@ def _balance_warnings(
 
 
 def _exchanged(
-    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], together: _Fit
+    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], together: Fit
 ) -> str:
     """Whether the balance closes with the other sign of some wheels' torques, or the accelerometer's other axis."""
     # A wheel of a wrong sign also brakes on average; in changes alone, the sharing of a pull among axles looks like a sign.

@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.axles import axle_warnings
+from terragrip.recording.codes import without_codes
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
+from terragrip.recording.pace import clock_warnings, odometry_warnings
 from terragrip.recording.reverse import reverse_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
@@ -59,21 +61,27 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
     The speeds are compared where both are well above standstill, by the median of their ratio.
     """
+    recording, codes = without_codes(recording, vehicle)
     track, angles, times = track_of(recording), _angle_warnings(recording), _time_warnings(recording)
     frozen = frozen_warnings(recording)
-    recording = averaged(recording, _FINEST)
+    whole, recording = recording, averaged(recording, _FINEST)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
+    made = [] if known is None else odometry_warnings(whole, known)
+    clock = [] if known is None else clock_warnings(whole, known)
+    if clock:  # every other check is by time
+        return [*codes, *clock, *made]
     shown = None if known is None else _shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
     sided = [] if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
     thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
     moved = motion_warnings(recording, vehicle, means, thrusts)
+    speeds = [] if known is None or sided else _speed_warnings(recording, known)
     notes = [
-        *(_speed_warnings(recording, known) if known is not None and not sided else ()),
+        *speeds,
         *sided,
         *_drive_warnings(recording),
-        *_position_warnings(recording, track),
+        *_position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds)),
         *exchanged,
         *_turn_warnings(recording, None if exchanged else vehicle, track),
         *angles,
@@ -82,6 +90,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *(torque_warnings(recording, known, means, thrusts) if known is not None and not moved else ()),
         *(inertial_warnings(recording, known) if known is not None else ()),
         *frozen,
+        *codes,
+        *made,
         *times,
     ]
     if notes or known is None:
@@ -144,7 +154,7 @@ def _drive_warnings(recording: Recording) -> list[str]:
     return [f"wheel_based_speed is {ratio:.3g} times the ground speed: {why}."]
 
 
-def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
+def _position_warnings(recording: Recording, track: Track | None, *, wheels_agree: bool = False) -> list[str]:
     """Ground speed against the positions, which are in degrees and nothing else.
 
     Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever the noise. One far below is
@@ -159,7 +169,10 @@ def _position_warnings(recording: Recording, track: Track | None) -> list[str]:
     if 2.9 < 1 / result < 4.4:
         return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
     if result < 1 / _TOO_FAST:
-        return [f"{sentence}: check its unit and scale."]
+        clock = (
+            " The wheels go with it: time may not be in seconds." if wheels_agree and result < 1 / 3 else ""
+        )
+        return [f"{sentence}: check its unit and scale.{clock}"]
     if 2.9 < result < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
         return [f"{sentence}: it was taken for km/h, and may be in m/s."]
     ahead = _straight_ahead(recording, track, _LONG_WAY)
@@ -241,7 +254,8 @@ def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track |
 
 def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
     """Whether a rate of turn (n,) is one value throughout while the rims differ from side to side in much of the driving."""
-    if len(np.unique(yaw[np.isfinite(yaw)])) != 1 or not vehicle.knows_wheels:
+    shown = yaw[np.isfinite(yaw)]
+    if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
         return False
     radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
     speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}

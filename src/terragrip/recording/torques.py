@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
-from terragrip.recording.mechanics import Means, driven_radii
+from terragrip.recording.mechanics import Fit, Means, driven_radii
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 
@@ -32,6 +32,8 @@ _LAG = 0.2  # s, and two samples: tyres and filters cause .1, rarely .15
 _UNSEEN_LAG = 0.3  # s, where a tool may pull unmeasured: an engine's governor answers it within .2
 _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
+_FORCES = {"kN": 1e3, "daN": 10.0, "lbf": 4.448}  # N; daN stands for the kilogram's weight, too
+_FACTOR = 1.5
 
 
 def torque_warnings(
@@ -70,10 +72,26 @@ def _scale_warnings(
         moved = means.of(recording.channels["acceleration_x"])
     fit = means.fit(thrust, pull + moved)
     if not fit.is_another_scale:
-        return []
+        return _pull_scale(means.fit(thrust - moved, pull))
     return [
         f"The drive torques over the wheel radius are {fit.slope:.2g} times the drawbar force and the force that moves "
         f"{vehicle.mass:.4g} kg like this: check the units of both, the torques' scale {check}."
+    ]
+
+
+def _pull_scale(fit: Fit) -> list[str]:
+    """The drawbar force alone of another scale: the thrust beyond what moves the mass, over it."""
+    if not fit.is_another_scale or fit.slope < 0:
+        return []
+    unit = min(_FORCES, key=lambda name: abs(np.log(fit.slope / _FORCES[name])))
+    near = abs(np.log(fit.slope / _FORCES[unit])) < np.log(_FACTOR)
+    return [
+        f"The wheels' thrust changes by {fit.slope:.2g} times what the drawbar force does, beyond the force that moves the vehicle: "
+        + (
+            f"it may be in {unit}: write 'unit: {unit}' for it in the profile."
+            if near
+            else "check its unit and scale."
+        )
     ]
 
 

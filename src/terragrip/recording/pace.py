@@ -1,0 +1,119 @@
+"""A clock in another unit, and a ground speed that is the wheels' own: what speeds say of both; sentences for the user, never errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Floats, Ints
+from terragrip.physics.geodesy import metres_of
+from terragrip.recording.turns import filled
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_GRIP = 15.0  # m/s²: no tyre or track on the ground gives as much
+_LAGS = (4, 16, 64)  # rows over which a speed changes
+_OFTEN = 0.97  # of the changes are slower
+_ENOUGH = 4000  # rows that are looked at
+_OUTRUN = 3.0  # the positions' spread over the way driven
+_SPREAD = 20.0  # m
+_CLOCK = "time may not be in seconds: give its unit in a profile, 'time: {from: ..., unit: min}'"
+
+_COPY = 2e-4  # of the speed: what no two sensors agree to
+_DRIVEN = 0.1  # of the greatest speed: more is motion
+
+
+def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where the speeds of ground and rims both change faster than any ground can make them, or where the positions lie
+    further apart than ground and rims drove in the time of the log."""
+    ground, rims = recording.channels.get("ground_speed"), _rims(recording, vehicle)
+    if ground is None or not rims or len(recording) < 2 * _LAGS[-1]:
+        return []
+    time, speed = recording.time, filled(recording.time, ground)
+    changes = _changes(time, speed, rims)
+    if changes > _GRIP:
+        return [
+            f"ground and wheels change their speed by {changes:.3g} m/s², as no ground lets them: {_CLOCK}."
+        ]
+    some = np.arange(0, len(time), max(1, len(time) // _ENOUGH))
+    way = min(_way(time[some], speed[some]), _way(time[some], _mean(rims, some)))
+    spread = _spread(recording)
+    if spread > max(_SPREAD, _OUTRUN * way):
+        return [
+            f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {_CLOCK}."
+        ]
+    return []
+
+
+def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where the ground speed is made of the driven wheels' speeds: slip is then 0 by construction."""
+    ground = recording.channels.get("ground_speed")
+    driven = [w for w, own in zip(vehicle.wheels, vehicle.driven, strict=True) if own]
+    columns = [recording.channels.get(f"wheel_speed_{w}") for w in driven]
+    known = [c for c in columns if c is not None]
+    if ground is None or not known or len(known) < len(driven):
+        return []
+    rows = np.flatnonzero(np.isfinite(ground) & np.isfinite(known).all(axis=0))
+    rows = rows[:: max(1, len(rows) // _ENOUGH)]
+    speed, turning = ground[rows], np.array(known)[:, rows].T
+    moving = np.abs(speed) > _DRIVEN * float(np.max(np.abs(speed), initial=0.0))
+    if moving.sum() < 20 * len(known) or not np.ptp(speed[moving]):
+        return []
+    speed, turning = speed[moving], turning[moving]
+    rest = speed - turning @ np.linalg.lstsq(turning, speed, rcond=None)[0]
+    if float(np.sqrt(np.mean(rest**2))) > _COPY * float(np.sqrt(np.mean(speed**2))):
+        return []
+    return [
+        "ground_speed is made of the wheels' speeds (odometry): slip is then what it was made with, and no measurement. Give a speed over "
+        "ground: of a receiver, a radar, or positions ('derivative_of')."
+    ]
+
+
+def _rims(recording: Recording, vehicle: Vehicle) -> list[tuple[float, Floats]]:
+    """Radius and speed (n,) [rad/s] of the wheels that have one."""
+    radii = {f"wheel_speed_{w}": float(r) for w, r in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)}
+    known = [(r, recording.channels[name]) for name, r in radii.items() if name in recording.channels]
+    filled_up = [(radius, filled(recording.time, values)) for radius, values in known]
+    return [(radius, values) for radius, values in filled_up if np.isfinite(values[:1]).all()]
+
+
+def _mean(rims: list[tuple[float, Floats]], rows: Ints) -> Floats:
+    """The rims' mean speed [m/s] in ``rows`` (m,)."""
+    return np.asarray(np.mean([radius * values[rows] for radius, values in rims], axis=0))
+
+
+def _changes(time: Floats, speed: Floats, rims: list[tuple[float, Floats]]) -> float:
+    """How fast both speeds (n,) change at once [m/s²], beyond the scatter of the calmer one from row to row."""
+    most = scatter = 0.0
+    rows = np.arange(0, len(time) - _LAGS[-1], max(1, len(time) // _ENOUGH))
+    before = _mean(rims, rows)
+    for lag in (1, *_LAGS):
+        a, b = speed[rows + lag] - speed[rows], _mean(rims, rows + lag) - before
+        both = np.minimum(np.abs(a), np.abs(b))
+        if lag == 1:
+            scatter = 3 * float(np.median(both))
+            continue
+        passed = float(np.median(time[rows + lag] - time[rows]))
+        fast = float(np.quantile(np.where(a * b > 0, both, 0.0), _OFTEN))
+        most = max(most, (fast - scatter) / passed)
+    return most
+
+
+def _way(time: Floats, speed: Floats) -> float:
+    return float(np.sum(np.abs(speed[1:] + speed[:-1]) * np.diff(time)) / 2)
+
+
+def _spread(recording: Recording) -> float:
+    """Between how far north and south, or east and west, 90 % of the positions lie [m]; 0 without positions."""
+    channels = recording.channels
+    if "latitude" not in channels or "longitude" not in channels:
+        return 0.0
+    known = np.flatnonzero(np.isfinite(channels["latitude"]) & np.isfinite(channels["longitude"]))
+    if len(known) < 2:
+        return 0.0
+    some = known[:: max(1, len(known) // _ENOUGH)]
+    places = metres_of(channels["latitude"][some], channels["longitude"][some])
+    return max(float(np.subtract(*np.quantile(x, [0.95, 0.05]))) for x in places)

@@ -1,0 +1,175 @@
+"""Codes for "not measured", a clock in another unit, a ground speed that is the wheels' own: on a made drive (Newton)."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+WHEELS = ("fl", "fr", "rl", "rr")
+MASS, RADIUS, G = 800.0, 0.35, 9.80665
+Columns = dict[str, np.ndarray]
+
+
+def machine(**rear: object) -> Vehicle:
+    axles = {
+        "front": {"mass": 350, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 450, "wheels": ["rl", "rr"], **rear},
+    }
+    base = {
+        "mass": MASS,
+        "wheelbase": 1.3,
+        "track": 1.1,
+        "center_of_gravity_height": 0.5,
+        "hitch_height": 0.3,
+    }
+    return Vehicle.from_dict({**base, "axles": axles, "wheel": {"radius": RADIUS, "inertia": 4}})
+
+
+def drive(rate: float = 20.0) -> Columns:
+    """Five minutes at 0 to 2 m/s with a stop each minute, a changing pull, positions."""
+    draws = np.random.default_rng(7)
+    time = np.arange(0, 300, 1 / rate)
+    speed = np.interp(time % 60, [0, 4, 25, 45, 49, 52], [0, 1.6, 1.2, 2.0, 1.9, 0])
+    change = np.gradient(speed, time)
+    pull = np.where(speed > 0.1, 900 + 500 * np.sin(time / 9), 0.0)
+    thrust = pull + MASS * (change + 0.06 * G * (speed > 0))
+    north = np.cumsum(speed) / rate
+    result = {
+        "time": time,
+        "ground_speed": speed + 0.01 * draws.standard_normal(len(time)),
+        "drawbar_force": pull + 10 * draws.standard_normal(len(time)),
+        "latitude": 51 + north / 111_250,
+        "longitude": 13 + 1e-7 * draws.standard_normal(len(time)),
+    }
+    for wheel in WHEELS:
+        turning = speed / (1 - thrust / (MASS * G) / 5) / RADIUS
+        result[f"wheel_speed_{wheel}"] = turning + 0.02 * draws.standard_normal(len(time))
+        result[f"drive_torque_{wheel}"] = thrust / 4 * RADIUS + 2 * draws.standard_normal(len(time))
+    return result
+
+
+def told(columns: Columns, vehicle: Vehicle | None = None) -> list[str]:
+    return unit_warnings(Recording.from_frame(columns), vehicle or machine())
+
+
+def spoilt(name: str, code: float, share: float = 0.01) -> Columns:
+    columns = drive()
+    rows = np.random.default_rng(3).random(len(columns["time"])) < share
+    return columns | {name: np.where(rows, code, columns[name])}
+
+
+@pytest.mark.parametrize("rate", [1.0, 20.0, 100.0])
+def test_a_right_log_says_nothing(rate: float) -> None:
+    assert told(drive(rate)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("ground_speed", 9999.0),
+        ("ground_speed", -9999 / 3.6),
+        ("wheel_speed_fl", 65535.0),
+        ("drive_torque_rr", -99999.0),
+        ("drawbar_force", 1e6),
+    ],
+)
+def test_a_code_for_no_value_is_named_alone(name: str, code: float) -> None:
+    """Scale, sign and slip are judged without it."""
+    (note,) = told(spoilt(name, code))
+    assert note.startswith(f"{name} is {code:.6g} in ")
+    assert "'invalid: [...]' in the profile" in note
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("drive_torque_rr", 300.0), ("drawbar_force", 6000.0), ("ground_speed", 12.0)]
+)
+def test_what_a_machine_can_have_is_no_code(name: str, value: float) -> None:
+    assert not any("a code for" in note for note in told(spoilt(name, value)))
+
+
+def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
+    columns = drive()
+    rows = np.arange(0, len(columns["time"]), 100)
+    spikes = columns["ground_speed"].copy()
+    spikes[rows] = 5000.0 + rows
+    assert not any("a code for" in note for note in told(columns | {"ground_speed": spikes}))
+    assert not any(
+        "a code for" in note for note in told(columns | {"ground_speed": 1e3 * columns["ground_speed"]})
+    )
+
+
+@pytest.mark.parametrize(("rate", "factor"), [(20.0, 60.0), (1.0, 60.0), (20.0, 3600.0)])
+@pytest.mark.parametrize("placed", [True, False])
+def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, placed: bool) -> None:
+    columns = drive(rate) | {"time": drive(rate)["time"] / factor}
+    if not placed:
+        columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
+    (note,) = told(columns)
+    assert re.search(r"change their speed by .* as no ground lets them: time may not be in seconds", note)
+
+
+def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> None:
+    """It changes its speed by .003 m/s²: a sixtieth of the time makes that no impossible one."""
+    time = np.arange(0, 1200, 0.05)
+    speed = 1.5 + 0.3 * np.sin(time / 100)
+    draws = np.random.default_rng(1)
+    columns = {"time": time / 60, "ground_speed": speed + 0.01 * draws.standard_normal(len(time))}
+    columns |= {f"wheel_speed_{w}": speed / RADIUS + 0.01 * draws.standard_normal(len(time)) for w in WHEELS}
+    columns |= {"latitude": 51 + np.cumsum(speed) * 0.05 / 111_250, "longitude": np.full(len(time), 13.0)}
+    (note,) = told(columns)
+    assert re.match(
+        r"The positions lie 1633 m apart, where ground and wheels drove 30\.07 m: time may not be in seconds",
+        note,
+    )
+
+
+def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed() -> None:
+    columns = drive()
+    notes = told(columns | {"time": np.arange(len(columns["time"]), dtype=float)})
+    assert any(note.endswith("The wheels go with it: time may not be in seconds.") for note in notes)
+    assert not any(
+        "time may not be" in note for note in told(columns | {"ground_speed": 3.6 * columns["ground_speed"]})
+    )
+
+
+def test_a_ground_speed_that_is_the_wheels_own_is_named() -> None:
+    columns = drive()
+    own = RADIUS * np.mean([columns[f"wheel_speed_{w}"] for w in WHEELS], axis=0)
+    assert any(
+        "ground_speed is made of the wheels' speeds" in note for note in told(columns | {"ground_speed": own})
+    )
+
+
+def test_a_free_wheel_that_was_made_of_the_ground_speed_is_none() -> None:
+    """docs/vehicle.md asks for it."""
+    columns = {n: v for n, v in drive().items() if n not in ("drive_torque_rl", "drive_torque_rr")}
+    columns |= {f"wheel_speed_{w}": columns["ground_speed"] / RADIUS for w in ("rl", "rr")}
+    assert not any("odometry" in note for note in told(columns, machine(driven=False)))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(0.1, "daN"), (1 / G, "daN"), (1 / 4.448, "lbf")])
+def test_a_drawbar_force_in_another_unit_is_named(factor: float, unit: str) -> None:
+    columns = drive()
+    (note,) = told(columns | {"drawbar_force": factor * columns["drawbar_force"]})
+    assert f"it may be in {unit}: write 'unit: {unit}' for it in the profile" in note
+
+
+@pytest.mark.parametrize(
+    "stamps", [np.round(np.arange(200) / 50, 1), np.float32(1.7e9) + np.zeros(200, dtype=np.float32)]
+)
+def test_rounded_stamps_are_told_from_a_row_that_stands_twice(stamps: np.ndarray) -> None:
+    columns = {name: values[:200] for name, values in drive().items()}
+    with pytest.raises(
+        InputError, match=r"row 2 .*: time repeats, as \d+% of the stamps here do: they are rounded"
+    ):
+        Recording.from_frame(columns | {"time": stamps.astype(np.float64)})
+    once = columns["time"].copy()
+    once[100] = once[99]
+    with pytest.raises(InputError, match=r"row 101 .*: time repeats; keep one row an instant"):
+        Recording.from_frame(columns | {"time": once})
