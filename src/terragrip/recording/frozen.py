@@ -19,6 +19,7 @@ _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: wh
 _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _DRIVING = 0.3  # of the speed that a twentieth of the drive exceeds
 _SEVERAL = 4  # channels
+_CHANGES = 20  # of a channel's value: fewer show no resolution
 _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
 _GAP, _APART = 1.0, 3.0  # s, and times the usual distance of samples
 _LOOKS = 8  # within `_LONG`: a value that is repeated for so long stands at half of them in succession
@@ -61,6 +62,13 @@ def frozen_warnings(recording: Recording) -> list[str]:
         pull = recording.channels["drawbar_force"]
         notes += _repeats("drawbar_force", recording.time, pull, list(torques.values()), forces=True)
     return notes + _off(recording.time, torques) + _hung(recording)
+
+
+def _by_steps(what: Floats, step: float) -> bool:
+    """Whether a channel (n,) changes from one of its ``step`` values to the next: no plateaus of a few speeds."""
+    changes = np.abs(np.diff(what))
+    changes = changes[changes > 0]
+    return len(changes) > _CHANGES and float(np.mean(changes < 1.5 * step)) > 0.5
 
 
 def _standing(recording: Recording, rims: list[str]) -> list[str]:
@@ -181,7 +189,7 @@ def _repeats(
     lasting = when[last] - when[first]
     usual = float(np.median(np.diff(when[first]))) if len(first) > 2 else np.inf
     step, size = quantum(what), float(np.quantile(np.abs(what), 0.95))
-    if step > _COARSE * size:
+    if step > _COARSE * size and _by_steps(what, step):
         return (
             []
             if forces

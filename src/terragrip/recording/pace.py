@@ -8,6 +8,8 @@ import numpy as np
 
 from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
+from terragrip.recording.held import measured_part
+from terragrip.recording.noise import white_noise
 from terragrip.recording.turns import filled
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ _OUTRUN = 3.0  # the positions' spread over the way driven
 _SPREAD = 20.0  # m
 _CLOCK = "time may not be in seconds: give its unit in a profile, 'time: {from: ..., unit: min}'"
 
-_COPY = 2e-4  # of the speed: what no two sensors agree to
+_SHARED, _COPY = 1e-3, 2e-4  # of the speed: noise of the ground speed, and how nearly the wheels have it too
 _DRIVEN = 0.1  # of the greatest speed: more is motion
 
 
@@ -62,9 +64,11 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     moving = np.abs(speed) > _DRIVEN * float(np.max(np.abs(speed), initial=0.0))
     if moving.sum() < 20 * len(known) or not np.ptp(speed[moving]):
         return []
+    noise = white_noise(*measured_part(recording.time, ground)) or 0.0
     speed, turning = speed[moving], turning[moving]
+    size = float(np.sqrt(np.mean(speed**2)))
     rest = speed - turning @ np.linalg.lstsq(turning, speed, rcond=None)[0]
-    if float(np.sqrt(np.mean(rest**2))) > _COPY * float(np.sqrt(np.mean(speed**2))):
+    if noise < _SHARED * size or float(np.sqrt(np.mean(rest**2))) > _COPY * size:
         return []
     return [
         "ground_speed is made of the wheels' speeds (odometry): slip is then what it was made with, and no measurement. Give a speed over "
