@@ -53,11 +53,12 @@ def interval_score(error: Floats, sd: Floats) -> float:
 
 
 def intervals(result: SimulationResult, estimates: Estimates, driven: list[str], moving: Flags) -> Intervals:
-    """Those of an estimate, driven wheels together."""
+    """Those of an estimate, driven wheels together; NaN of what it lacks (from speeds alone all but slip)."""
     covered, score = {}, {}
     for quantity in COVERED:
-        errors, sds = [], []
-        for name in [quantity] if quantity == "soil_resistance" else [f"{quantity}_{w}" for w in driven]:
+        errors, sds = [np.empty(0)], [np.empty(0)]
+        names = [quantity] if quantity == "soil_resistance" else [f"{quantity}_{w}" for w in driven]
+        for name in (name for name in names if name in estimates):
             error = estimates[name] - result.truth[f"true_{name}"].to_numpy()
             rows = moving & np.isfinite(error) & np.isfinite(estimates[f"{name}_std"])
             errors.append(error[rows])
