@@ -5,8 +5,8 @@
 The numbers are tg_tuned (kernel/include/terragrip.h), the bank's scales, all together, and `huber`. A line a number: R² of
 adhesion less that with the number as it is, median and worst machine over all rates; NIS a channel of moving rows; the interval
 scores of adhesion, slip and soil resistance over those with the number as it is, geometric means. Every log loses its ground speed
-for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has something to do. --write
-puts the table into docs/families.md.
+for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has something to do. The numbers
+of slip from speeds alone are tried on the same logs without torques. --write puts the table into docs/families.md.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from bench_families import DOCUMENT, Floats, driven_wheels, moving_rows, pooled_r2
+from bench_families import DOCUMENT, Floats, driven_wheels, moving_rows, pooled_r2, result_without
 from family_intervals import SCORED, intervals
 from marked import put
 from terragrip._kernel import ffi, lib
 from terragrip.estimation import estimator as estimator_module
+from terragrip.estimation import rims
 from terragrip.estimation.batch import estimate
 from terragrip.estimation.engine import EVENTS
 from terragrip.simulation import SimulationResult
@@ -30,7 +31,19 @@ from terragrip.simulation.families import draw, machines
 
 BEGIN = "<!-- made by benchmarks/bench_constants.py --write -->"
 AT_REST = [EVENTS.index("standstill"), EVENTS.index("gap")]
-as_set = estimator_module.settings_of
+ALONE = (
+    "manoeuvre",
+    "slipping",
+    "lasting",
+    "mode_dwell",
+    "first_rate",
+    "slowest",
+    "apart",
+)  # of speeds alone
+SETTINGS = (
+    (estimator_module, "settings_of"),
+    (rims, "speed_settings"),
+)  # where a log with torques takes them, and one without
 
 
 @dataclass(frozen=True)
@@ -55,7 +68,9 @@ def main() -> None:
         for rate in arguments.rates
     ]
     drawn = [damaged(result, bare=k % 2 == 1) for k, result in enumerate(drawn)]
+    alone = [result_without(one, "drive_torque") for one in drawn]
     usual = figures(drawn, lambda settings: None)
+    usual_alone = figures(alone, lambda settings: None)
     nis = f"{np.median(usual.nis):.2f}"
     columns = ["R² median", "worst", "NIS", "score µ", "slip", "ρs"]
     lines = [
@@ -67,11 +82,17 @@ def main() -> None:
         if arguments.only and name not in arguments.only:
             continue
         cells = [name, value]
+        logs, before = (alone, usual_alone) if name in ALONE else (drawn, usual)
         for factor in (0.5, 2.0):
-            out = figures(drawn, scaled(name, factor))
-            change = out.r2 - usual.r2
-            cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}", f"{np.median(out.nis):.2f}"]
-            cells += [f"{ratio:.3f}" for ratio in np.exp(np.nanmean(np.log(out.score / usual.score), axis=0))]
+            out = figures(logs, scaled(name, factor))
+            change = out.r2 - before.r2
+            known = np.isfinite(change).all()
+            cells += [f"{np.median(change):+.4f}", f"{change.min():+.4f}"] if known else ["", ""]
+            cells.append(f"{np.median(out.nis):.2f}")
+            cells += [
+                f"{np.exp(np.nanmean(np.log(ratio))):.3f}" if np.isfinite(ratio).any() else ""
+                for ratio in (out.score / before.score).T
+            ]
         lines.append("| " + " | ".join(cells) + " |")
         print(lines[-1], flush=True)
     text = "\n".join(lines)
@@ -97,7 +118,10 @@ def damaged(result: SimulationResult, bare: bool) -> SimulationResult:
 def numbers() -> dict[str, str]:
     """Every tuned number by name, and its value."""
     settings = lib.tg_default_settings()
-    out = {name: f"{getattr(settings.tuned, name):.3g}" for name, _ in ffi.typeof("tg_tuned").fields}
+    out = {}
+    for name, field in ffi.typeof("tg_tuned").fields:
+        value = getattr(settings.tuned, name)
+        out[name] = " ".join(f"{v:.3g}" for v in (value if field.type.kind == "array" else [value]))
     out["scales"] = " ".join(f"{scale:g}" for scale in settings.tuning.scales)
     for name in ("huber", "dwell"):
         out[name] = f"{getattr(settings.tuning, name):g}"
@@ -108,26 +132,35 @@ def scaled(name: str, factor: float) -> Callable[[Any], None]:
     """A change of settings: this number times `factor`."""
 
     def change(settings: Any) -> None:
-        if name == "scales":
-            for k in range(len(settings.tuning.scales)):
-                settings.tuning.scales[k] *= factor
+        holder = settings.tuning if name in ("scales", "huber", "dwell") else settings.tuned
+        value = getattr(holder, name)
+        if isinstance(value, float):
+            setattr(holder, name, value * factor)
         else:
-            holder = settings.tuning if name in ("huber", "dwell") else settings.tuned
-            setattr(holder, name, getattr(holder, name) * factor)
+            for k in range(len(value)):
+                value[k] *= factor
         lib.tg_tune_walks(settings)
 
     return change
 
 
-def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Figures:
-    """All recordings with the settings changed."""
+def changed(made: Callable[..., Any], change: Callable[[Any], None]) -> Callable[..., Any]:
+    """What makes settings, and changes them."""
 
-    def changed(*arguments: Any, **named: Any) -> Any:
-        settings = as_set(*arguments, **named)
+    def remade(*arguments: Any, **named: Any) -> Any:
+        settings = made(*arguments, **named)
         change(settings)
         return settings
 
-    estimator_module.settings_of = changed
+    return remade
+
+
+def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Figures:
+    """All recordings with the settings changed."""
+
+    usual = [getattr(holder, name) for holder, name in SETTINGS]
+    for (holder, name), made in zip(SETTINGS, usual, strict=True):
+        setattr(holder, name, changed(made, change))
     r2, nis, score = [], [], []
     for result in drawn:
         estimates = estimate(result.recording, result.vehicle)
@@ -135,12 +168,16 @@ def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Fig
         measured = np.isfinite(result.recording[f"wheel_speed_{wheels[0]}"])
         rows = moving_rows(result) & measured
         truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in wheels], axis=1)
-        r2.append(pooled_r2(truth, np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1), rows))
+        estimated = np.full(truth.shape, np.nan)
+        if f"adhesion_{wheels[0]}" in estimates:
+            estimated = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
+        r2.append(pooled_r2(truth, estimated, rows))
         held = intervals(result, estimates, wheels, rows)
         score.append([held.score[name] for name in SCORED])
         taken = (estimates["channels"] > 0) & ~np.isin(estimates.event_codes, AT_REST)
         nis.append(float(estimates["nis"][taken].sum() / estimates["channels"][taken].sum()))
-    estimator_module.settings_of = as_set
+    for (holder, name), made in zip(SETTINGS, usual, strict=True):
+        setattr(holder, name, made)
     return Figures(np.array(r2), np.array(nis), np.array(score))
 
 

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from family_intervals import COVERED, SCORED, Intervals, calibrated, intervals, oracle_scores
@@ -148,14 +147,13 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
     for view in VIEWS:
         seen = faulty if view == "faults together" else result
         vehicle = calibrated(seen) if view == "calibrated" else seen.vehicle
-        recording = seen.recording
         if view == "no accelerometer":
-            if "acceleration_x" not in recording.channels:
+            if "acceleration_x" not in seen.recording.channels:
                 continue
-            recording = without(recording, "acceleration")
+            seen = result_without(seen, "acceleration")
         elif view == "speeds alone":
-            recording = without(recording, "drive_torque")
-        seen = replace(seen, recording=recording, truth=_at(seen, recording))
+            seen = result_without(seen, "drive_torque")
+        recording = seen.recording
         estimates = estimate(recording, vehicle, method=method)
         driven, moving = driven_wheels(seen), moving_rows(seen)
         held = intervals(seen, estimates, driven, moving)
@@ -170,9 +168,11 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
     return out
 
 
-def _at(result: SimulationResult, recording: Recording) -> pd.DataFrame:
-    """The truth at the rows of a recording that has fewer."""
-    return result.truth[np.isin(result.recording.time, recording.time)].reset_index(drop=True)
+def result_without(result: SimulationResult, start: str) -> SimulationResult:
+    """The recording as `without` leaves it, and the truth at its rows."""
+    recording = without(result.recording, start)
+    rows = np.isin(result.recording.time, recording.time)
+    return replace(result, recording=recording, truth=result.truth[rows].reset_index(drop=True))
 
 
 def without(recording: Recording, start: str) -> Recording:

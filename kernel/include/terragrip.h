@@ -348,9 +348,18 @@ typedef struct {
     tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
     tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is low-passed */
     tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be at most */
+    tg_real least_slip;             /* below it the secant of that curve is not known */
+    tg_real small_slip;             /* SD of slip: a noise below it is small */
     tg_real lasting_share;          /* of what lasts beyond all trends: how likely it is adhesion, and not load */
     tg_real soil_spread;            /* relative SD of the resistance of a field's soil: what it does beyond that may be slope, where nothing tells the slope; */
     tg_real hill_memory;            /* wheel radii over which its mean and its SD are taken for that, at most */
+    /* Of slip from speeds alone (TG_SPEEDS): what drivers and motors do, not scaled by the machine. */
+    tg_real manoeuvre[3];           /* (m/s^2)^2/s, what the acceleration gains: a steady drive, driving by hand, sharp starts and stops */
+    tg_real slipping[3];            /* 1/s, variance that slip gains: one ground and load, a rough one, a wheel that lets go */
+    tg_real lasting, mode_dwell;    /* s: time constant of the acceleration; mean time in a pair of those densities */
+    tg_real first_rate;             /* m/s^2, SD of the acceleration before it was seen */
+    tg_real slowest;                /* m/s: slower wheels change their slip speed no less */
+    tg_real apart;                  /* 1 - the correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load */
 } tg_tuned;
 
 typedef struct {

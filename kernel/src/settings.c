@@ -69,9 +69,22 @@ static tg_tuned default_tuned(void)
     k.slip_length = (tg_real)0.25;
     k.bend = (tg_real)0.5;
     k.bend_spread = (tg_real)0.9;
+    k.least_slip = (tg_real)0.02;
+    k.small_slip = (tg_real)0.002;
     k.lasting_share = (tg_real)0.5;
     k.soil_spread = (tg_real)0.2;
     k.hill_memory = 1000;
+    k.manoeuvre[0] = (tg_real)1e-3;
+    k.manoeuvre[1] = (tg_real)3e-2;
+    k.manoeuvre[2] = 1;
+    k.slipping[0] = (tg_real)2.5e-5;
+    k.slipping[1] = (tg_real)2.5e-3;
+    k.slipping[2] = (tg_real)0.25;
+    k.lasting = 3;
+    k.mode_dwell = 2;
+    k.first_rate = 1;
+    k.slowest = (tg_real)0.1;
+    k.apart = (tg_real)0.1;
     return k;
 }
 

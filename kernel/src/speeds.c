@@ -6,17 +6,6 @@
 #include "estimator.h"
 
 #define TG_LEVELS 3
-#define TG_LASTING ((tg_real)3)        /* s, time constant of the acceleration */
-#define TG_DWELL ((tg_real)2)          /* s, mean time in a pair of densities */
-#define TG_FIRST_RATE ((tg_real)1)     /* m/s^2, SD of the acceleration before it was seen */
-#define TG_SLOWEST ((tg_real)0.1)      /* m/s: slower wheels change their slip speed no less */
-#define TG_TOGETHER ((tg_real)0.9)     /* correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load */
-
-/* (m/s^2)^2/s: a steady drive, driving by hand, sharp starts and stops. */
-static const tg_real manoeuvres[TG_LEVELS] = {(tg_real)1e-3, (tg_real)3e-2, 1};
-/* Square of the change of slip per root second: one ground and load, a rough one, a wheel that lets go. */
-static const tg_real slippings[TG_LEVELS] = {(tg_real)2.5e-5, (tg_real)2.5e-3, (tg_real)0.25};
-
 #define SIZE TG_SPEED_STATES
 
 typedef struct { /* what a row measures [m/s]: ground speed, rims; and which channels there are */
@@ -30,7 +19,7 @@ typedef struct { /* how the samples fitted one mode */
 } tgi_speed_fit;
 
 /* Variance that the densities add over dt; the noise of slip speeds is in proportion to the speeds in `x`. */
-static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real manoeuvre, tg_real slipping, int32_t n)
+static void disturb(const tg_tuned *k, const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real manoeuvre, tg_real slipping, int32_t n)
 {
     P[0][0] += manoeuvre * dt * dt * dt / 3;
     P[0][1] += manoeuvre * dt * dt / 2;
@@ -39,9 +28,9 @@ static void disturb(const tg_real *x, tg_real (*P)[SIZE], tg_real dt, tg_real ma
     tg_real fast[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) {
         const tg_real speed = tgi_fabs(x[0]), rim = tgi_fabs(x[0] + x[2 + i]);
-        fast[i] = tgi_max(tgi_max(speed, rim), TG_SLOWEST);
+        fast[i] = tgi_max(tgi_max(speed, rim), k->slowest);
         for (int32_t j = 0; j <= i; j++) {
-            const tg_real added = (j < i ? TG_TOGETHER : 1) * slipping * dt * fast[i] * fast[j];
+            const tg_real added = (j < i ? 1 - k->apart : 1) * slipping * dt * fast[i] * fast[j];
             P[2 + i][2 + j] += added;
             if (j < i) P[2 + j][2 + i] += added;
         }
@@ -61,10 +50,10 @@ static void carry_on(tg_real (*P)[SIZE], tg_real reach, tg_real keep, int32_t si
     }
 }
 
-static void passage_of(tg_real dt, tg_real *reach, tg_real *keep)
+static void passage_of(tg_real dt, tg_real lasting, tg_real *reach, tg_real *keep)
 {
-    *reach = -TG_LASTING * tgi_expm1(-dt / TG_LASTING);
-    *keep = tgi_exp(-dt / TG_LASTING);
+    *reach = -lasting * tgi_expm1(-dt / lasting);
+    *keep = tgi_exp(-dt / lasting);
 }
 
 /* Channel c sees v, a wheel v + d. */
@@ -141,8 +130,9 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     const int32_t n = e->settings.machine.wheels, size = n + 2;
     tgi_speed_fit fit[TG_SPEED_MODES];
     tg_real reach, keep, best = 0, sum = 0, weight[TG_MAX_WHEELS + 1] = {0}, scale[SIZE];
-    const tg_real stay = tgi_exp(-dt / TG_DWELL), leave = -tgi_expm1(-dt / TG_DWELL) / TG_SPEED_MODES;
-    passage_of(dt, &reach, &keep);
+    const tg_tuned *const tuned = &e->settings.tuned;
+    const tg_real stay = tgi_exp(-dt / tuned->mode_dwell), leave = -tgi_expm1(-dt / tuned->mode_dwell) / TG_SPEED_MODES;
+    passage_of(dt, tuned->lasting, &reach, &keep);
     memcpy(scale, s->x, sizeof scale);
     move(scale, reach, keep);
     const tg_real side = in->y[0] > scale[0] ? 1 : -1;
@@ -153,7 +143,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
         mix(mode, s, stay * s->probability[m] / prior, size);
         move(mode->x, reach, keep);
         carry_on(mode->P, reach, keep, size);
-        disturb(scale, mode->P, dt, manoeuvres[m / TG_LEVELS], slippings[m % TG_LEVELS], n);
+        disturb(tuned, scale, mode->P, dt, tuned->manoeuvre[m / TG_LEVELS], tuned->slipping[m % TG_LEVELS], n);
         fit[m].score = tgi_log(prior);
         update(mode, &fit[m], in, e->settings.tuning.huber, size);
         if (m == 0 || fit[m].score > best) best = fit[m].score;
@@ -162,8 +152,8 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     s->manoeuvre = s->slipping = 0;
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         const tg_real p = s->probability[m] /= sum;
-        s->manoeuvre += p * manoeuvres[m / TG_LEVELS];
-        s->slipping += p * slippings[m % TG_LEVELS];
+        s->manoeuvre += p * tuned->manoeuvre[m / TG_LEVELS];
+        s->slipping += p * tuned->slipping[m % TG_LEVELS];
         for (int32_t k = 0; k < in->count; k++) {
             const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed stands first here, after the wheels elsewhere */
             if (m == 0) row->channel_nis[place] = 0;
@@ -197,7 +187,7 @@ static void begin(tg_estimator *e, const tgi_speed_samples *in, int32_t n)
     s->x[0] = v;
     s->x[1] = 0;
     s->P[0][0] = isnan(in->y[0]) ? broad : in->variance[0];
-    s->P[1][1] = tgi_square(TG_FIRST_RATE);
+    s->P[1][1] = tgi_square(e->settings.tuned.first_rate);
     for (int32_t c = 1; c <= n; c++) {
         const int32_t k = 1 + c;
         s->x[k] = isnan(in->y[c]) ? 0 : in->y[c] - v;
@@ -317,18 +307,18 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
 size_t tgi_speeds_length(void) { return sizeof(tgi_speeds) / sizeof(tg_real); }
 
 /* Rauch, Tung and Striebel (1965), with the densities that the row behind was reached by. */
-static void step_back(tgi_speeds *here, const tgi_speeds *filtered_next, const tgi_speeds *next, int32_t n)
+static void step_back(const tg_tuned *tuned, tgi_speeds *here, const tgi_speeds *filtered_next, const tgi_speeds *next, int32_t n)
 {
     const int32_t size = n + 2;
     tg_real ahead[SIZE][SIZE], factor[SIZE][SIZE], gain[SIZE][SIZE], change[SIZE], x[SIZE], reach, keep;
-    passage_of(filtered_next->dt, &reach, &keep);
+    passage_of(filtered_next->dt, tuned->lasting, &reach, &keep);
     memcpy(ahead, here->P, sizeof ahead);
     memcpy(gain, here->P, sizeof gain);
     carry_on(ahead, reach, keep, size);
     for (int32_t j = 0; j < size; j++) move(gain[j], reach, keep); /* P F', which times inverse(ahead) is the gain */
     memcpy(x, here->x, sizeof x);
     move(x, reach, keep);
-    disturb(x, ahead, filtered_next->dt, filtered_next->manoeuvre, filtered_next->slipping, n);
+    disturb(tuned, x, ahead, filtered_next->dt, filtered_next->manoeuvre, filtered_next->slipping, n);
     for (int32_t j = 0; j < size; j++) change[j] = next->x[j] - x[j];
     memcpy(factor, ahead, sizeof factor);
     if (!tgi_divide_rows(size, SIZE, factor[0], gain[0])) return;
@@ -348,7 +338,7 @@ void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_r
     if (next) {
         memcpy(&behind, next, sizeof behind);
         memcpy(&smoothed, carry, sizeof smoothed);
-        if (behind.anew == 0) step_back(&here, &behind, &smoothed, set->machine.wheels);
+        if (behind.anew == 0) step_back(&set->tuned, &here, &behind, &smoothed, set->machine.wheels);
     }
     memcpy(carry, &here, sizeof here);
     tgi_speeds_report(set, &here, o);

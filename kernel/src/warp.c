@@ -8,9 +8,6 @@
 
 #define TG_TRENDS 3 /* alike, along, across */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
-#define TG_LEAST_SLIP ((tg_real)0.02) /* below it the secant of the curve is not known */
-#define TG_SMALL_SLIP ((tg_real)4e-6) /* .002 squared: a noise below it is small */
-
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends leave patterns. */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
@@ -96,7 +93,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real fresh, tg_re
         return;
     }
     tgi_warp(c, slip, warp);
-    const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + TG_SMALL_SLIP);
+    const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
     const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row tells less than usual */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
@@ -129,7 +126,7 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
-    const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, TG_LEAST_SLIP);
+    const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
     const tg_real told = w->square > 0 ? k->bend * excess / w->square : 0, slope = told * tgi_max(w->pulling, 0) * inverse;
     tg_real lasting = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
