@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,14 @@ sensors: {{wheel_speed: 0.02, ground_speed: 0.01, drive_torque: 0.3, drawbar_for
 
 
 def write_log(path: Path, seed: int, day: str = "2026-05-01", seconds: float = 20.0) -> Path:
+    """Write `drive_of` to a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(drive_of(seed, day, seconds))
+    return path
+
+
+@cache
+def drive_of(seed: int, day: str, seconds: float) -> str:
     """A drive on one ground whose pull rises by steps, in closed form (physics.md 1), with noise; a CSV at 50 Hz with clock times."""
     draws = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 0.02)
@@ -45,9 +54,7 @@ def write_log(path: Path, seed: int, day: str = "2026-05-01", seconds: float = 2
         table[f"drive_torque_{wheel}"] = (
             adhesion + tire
         ) * radius * weight / 2 + 0.3 * draws.standard_normal(time.size)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(table).to_csv(path, index=False)
-    return path
+    return str(pd.DataFrame(table).to_csv(index=False))
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 from lane_drives import EARTH, drive, lanes, local_east
 from terragrip.cli import main
 from terragrip.estimation import Estimates
+from terragrip.maps.field_map import MOST_CELLS
 
 Change = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -159,12 +160,17 @@ def test_a_datum_that_is_none_of_latitude_and_longitude(
 
 @pytest.mark.parametrize("heading", [0.0, 45.0, 90.0])
 def test_a_grid_too_fine_is_refused_with_a_size_that_does(
-    tmp_path: Path, heading: float, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, heading: float, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     way = np.arange(0.0, 900.0, 0.05)
     north = way * np.sin(np.radians(heading)) + 400 * (heading != 45.0) * (way > 450) * (way - 450) / 450
     estimates = drive(way * np.cos(np.radians(heading)) + (heading == 90.0) * way / 2, north)
     code, _, error = mapped(tmp_path, estimates, "--cell", "0.05", capsys=capsys)
+    assert code == 2
+    assert f"{MOST_CELLS} cells" in error
+    # of fewer cells, for a map of as many as there may be takes seconds
+    monkeypatch.setattr("terragrip.maps.field_map.MOST_CELLS", MOST_CELLS // 100)
+    code, _, error = mapped(tmp_path, estimates, "--cell", "0.5", capsys=capsys)
     assert code == 2
     assert "--cell" in error
     size = re.search(r"([\d.]+) m or more", error)
