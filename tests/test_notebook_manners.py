@@ -20,7 +20,7 @@ from terragrip.ground.events import Event
 from terragrip.ground.sections import Section
 from terragrip.ground.span import Span
 from terragrip.ground.views import table_of
-from terragrip.simulation import simulate
+from terragrip.simulation import Scenario, simulate
 from terragrip.soil.estimates import GatheredRuns
 
 pytest.importorskip("matplotlib", reason="figures need terragrip[report]")
@@ -28,7 +28,7 @@ pytest.importorskip("matplotlib", reason="figures need terragrip[report]")
 
 @pytest.fixture(scope="module")
 def run() -> Any:
-    return simulate("multi2", 1000)
+    return simulate(Scenario.load("multi2").model_copy(update={"duration": 250.0}), 1000)
 
 
 @pytest.fixture(scope="module")

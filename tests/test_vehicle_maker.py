@@ -42,7 +42,7 @@ def test_the_intervals_hold_for_machines_of_the_class(name: str) -> None:
     known = {"mass": machine.typical_mass().value, "wheel_radius": 0.8 if name == "tractor-4wd" else 0.2}
     made = make(machine, "torque", known)
     held: dict[str, list[bool]] = {"adhesion_rr": [], "adhesion_fr": [], "slip_rr": [], "soil_resistance": []}
-    for _ in range(40):
+    for _ in range(20):
         true = known | {
             field.name: field.typical.value
             * float(np.exp(field.typical.spread / field.typical.value * draws.standard_normal()))

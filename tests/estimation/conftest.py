@@ -7,6 +7,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -139,8 +140,8 @@ def make_problem(
 
 @pytest.fixture(scope="session")
 def problem() -> Callable[..., Problem]:
-    """:func:`make_problem`."""
-    return make_problem
+    """:func:`make_problem`; the same problem for all who ask for it, so not to be changed."""
+    return cache(make_problem)
 
 
 def _ten_line_filter(F: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, ys: Any) -> list[tuple[Any, Any]]:

@@ -61,7 +61,7 @@ def test_a_common_gain_leaves_no_trace_and_is_said_to(drive: Make, vehicle: Vehi
 
 def test_intervals_hold_over_noise_and_patchy_ground(drive: Make, vehicle: Vehicle) -> None:
     inside, z = [], []
-    for seed in range(24):
+    for seed in range(12):
         gain = 1 + 0.02 * np.random.default_rng(100 + seed).standard_normal(4)
         truth = gain / np.exp(np.mean(np.log(gain)))
         result = calibrate(drive(gain=gain, patches=0.1, noise=1.0, seed=seed, standing=10), vehicle)
@@ -74,7 +74,7 @@ def test_intervals_hold_over_noise_and_patchy_ground(drive: Make, vehicle: Vehic
 
 def test_patchy_ground_alone_sets_the_error_of_the_fit() -> None:
     z = []
-    for seed in range(40):
+    for seed in range(20):
         fit = fit_shared_gains(rows(seed))
         assert fit is not None
         truth = np.log(RELATIVE)
