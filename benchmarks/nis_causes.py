@@ -3,9 +3,9 @@
 For each mean outside what is good: what the typical row has (median over that of chi-square, so that a few rows do not count), the share
 of the sum that a twentieth of the rows carries, the mean with this channel's noise halved and doubled, without accelerometer, without
 yaw rate, with a hundredth of the soil resistance's walk, with one fixed Q (method kalman), with the accelerometer's shocks counted once
-and remembered ten times as long, and over the rows whose rims are steady; how much successive innovations are alike, which white ones
-are not; and how far the wheels' adhesions walk together: the square of their sum's steps over the sum of their squares, which the model
-takes to be 1.
+and remembered ten times as long, over the rows whose rims are steady, and over the others; how much successive innovations are alike,
+which white ones are not; and how far the wheels' adhesions walk together: the square of their sum's steps over the sum of their squares,
+which the model takes to be 1.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ ALIKE = 0.5
 LARGEST = 4.0
 """SDs: an innovation beyond counts as this where successive ones are compared."""
 AROUND, STEADY = 0.5, 0.1
-"""Steady rims: from so many seconds before to so many after they stay within this share of their speed."""
+"""Steady rims: from so many seconds before to so many after, and over the rows beside, they stay within this share of their speed."""
 GAP = 2.0
 """s: rows farther apart are not compared."""
 LEAST = 20
@@ -63,6 +63,7 @@ class Shown:
     fixed: float
     calm_shocks: float
     steady: float
+    changing: float
     alike: float
     together: float
     stale: bool
@@ -100,6 +101,10 @@ class Shown:
             (self.near(self.no_yaw), "turns: the yaw rate is not what the sides do"),
             (self.alike > ALIKE, f"{lasting}: successive innovations are alike"),
             (self.mean > 1 and self.beyond(self.steady), "rims that change: starts, stops and turns of a new command carry it"),
+            (
+                self.mean < 1 and self.steady < self.mean and self.near(self.changing),
+                "a walk as wide as starts and stops need: steady rows are below 1, the others near it",
+            ),
             (self.near(self.doubled), "noise understated"),
             (self.near(self.halved), "noise overstated: scatter and manoeuvre look alike"),
             (self.near(self.calm_shocks), "shocks of starts and bumps count twice, and for seconds after"),
@@ -155,7 +160,11 @@ def rims_are_steady(estimates: Estimates) -> npt.NDArray[np.bool_]:
     """Rows around which no rim's speed changes by more than its share (n,)."""
     time = estimates.time
     rows = zip(
-        np.searchsorted(time, time - AROUND), np.searchsorted(time, time + AROUND, "right"), strict=True
+        np.minimum(np.searchsorted(time, time - AROUND), np.maximum(np.arange(len(time)) - 1, 0)),
+        np.maximum(
+            np.searchsorted(time, time + AROUND, "right"), np.minimum(np.arange(len(time)) + 2, len(time))
+        ),
+        strict=True,
     )
     rims = np.abs(np.stack([estimates[f"wheel_speed_{w}"] for w in estimates.wheels], axis=1))
     spans = [(rims[i:j].min(axis=0), rims[i:j].max(axis=0)) for i, j in rows]
@@ -205,7 +214,8 @@ def experiments(recording: Recording, vehicle: Vehicle, estimates: Estimates, ki
 
     now = values(estimates, kind)
     largest = np.sort(now)[-max(int(FEW * len(now)), 1) :]
-    steady = values(estimates, kind, rims_are_steady(estimates))
+    calm = rims_are_steady(estimates)
+    steady, changing = values(estimates, kind, calm), values(estimates, kind, ~calm)
     held = estimates.about["settings"]["held"]
     return Shown(
         mean=float(np.mean(now)),
@@ -219,6 +229,7 @@ def experiments(recording: Recording, vehicle: Vehicle, estimates: Estimates, ki
         fixed=mean(recording, method="kalman") if filtered else float("nan"),
         calm_shocks=with_tuned(kind == "accelerometer", shock_samples=0.5, shock_memory=10.0),
         steady=float(np.mean(steady)) if len(steady) >= LEAST else float("nan"),
+        changing=float(np.mean(changing)) if len(changing) >= LEAST else float("nan"),
         alike=alike(recording, estimates, kind),
         together=together(estimates),
         stale=any(n.startswith(("drive_torque", "wheel_speed")) for n in held),
@@ -230,13 +241,14 @@ def table(
 ) -> str:
     """The rows (data, log, recording, vehicle, estimates, kind) as a table; ``cell`` writes a number."""
     head = ("data", "log", "channel", "NIS", "typical row", "a twentieth carries", "noise halved", "doubled", "no accelerometer",
-            "no yaw rate", "calm resistance", "fixed Q", "calm shocks", "rims steady", "alike", "adhesions together", "cause")  # fmt: skip
+            "no yaw rate", "calm resistance", "fixed Q", "calm shocks", "rims steady", "rims change", "alike",
+            "adhesions together", "cause")  # fmt: skip
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for data, log, recording, vehicle, estimates, kind in rows:
         shown = experiments(recording, vehicle, estimates, kind)
         figures = (
             shown.halved, shown.doubled, shown.no_acceleration, shown.no_yaw, shown.calm_resistance, shown.fixed,
-            shown.calm_shocks, shown.steady, shown.alike, shown.together,
+            shown.calm_shocks, shown.steady, shown.changing, shown.alike, shown.together,
         )  # fmt: skip
         lines.append(
             f"| {data} | {log} | {kind} | {shown.mean:.2f} | {shown.typical:.2f} | {shown.carried:.0%} | "

@@ -47,6 +47,9 @@ def detect(data: bytes, source: str) -> Dialect:
     lines = [line for line in head.decode("utf-8", "replace").splitlines() if line.strip()][:60]
     if not lines:
         raise InputError("is empty", file=source, hint="give a table with a header and rows")
+    if lines[0].lstrip().startswith(("{", "[{")):
+        hint = "save it as CSV or Parquet, e.g. by pandas.read_json(...).to_parquet(...)"
+        raise InputError("is JSON", file=source, hint=hint)
     if lines[0].lower().startswith("sep="):  # Excel's own hint
         start = _after_lines(data, start, 1)
         lines = lines[1:] or [""]

@@ -18,6 +18,7 @@ from terragrip.formats.proposal import is_ready, missing_channels, profile_text,
 from terragrip.formats.reading import read, read_log, recording_of
 from terragrip.formats.recognition import Proposal, propose, silent
 from terragrip.formats.signals import SignalLog
+from terragrip.formats.spoilt import days_in, notes_on, numbers_of
 from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import find_time
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
@@ -29,7 +30,6 @@ from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
-from terragrip.written_times import doubt
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (
@@ -146,7 +146,8 @@ def inspect(
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
     quiet = silent(numbers, proposals, seen.units)
-    warnings += [] if seen.stamp is not None else seen.doubtful_dates()
+    warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
+    warnings += days_in(seen.floats(), GENERAL)
     warnings += [*quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
@@ -212,8 +213,10 @@ class Seen:
             units = {name: signal.unit for name, signal in log.signals.items() if signal.unit}
             clocks = {name: signal.time - first for name, signal in log.signals.items()}
             return cls(columns, units, (TIME, "s"), base - first, clocks, since_1970=False, whole=whole)
+        written = {n: v for n, c in log.columns.items() if (v := numbers_of(c)) is not None}
+        log = replace(log, columns={**log.columns, **written})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
-        dates = tuple(n for n, c in log.columns.items() if c.dtype.kind == "M")
+        dates = tuple(n for n, c in log.columns.items() if c.dtype.kind in "mM")
         stamp = find_time(numbers, dates, log.units, vocabulary)
         repeats = Repeats()
         if stamp is not None:
@@ -231,26 +234,22 @@ class Seen:
         own = self.stamp is not None and name == self.stamp[0]
         return self.clocks.get(name, None if own else self.base)
 
+    def floats(self) -> dict[str, Floats]:
+        """The numeric columns."""
+        return {
+            n: c.astype(np.float64, copy=False) for n, c in self.columns.items() if c.dtype.kind in "fiub"
+        }
+
     def numbers(self) -> dict[str, Floats]:
         """The numeric columns but time."""
         own = None if self.stamp is None or self.clocks else self.stamp[0]
-        return {
-            n: c.astype(np.float64, copy=False)
-            for n, c in self.columns.items()
-            if c.dtype.kind in "fiub" and n != own
-        }
+        return {n: values for n, values in self.floats().items() if n != own}
 
     def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> dict[str, Proposal]:
         """What each channel may be made of, by a vocabulary, and by the radii of a vehicle."""
         numbers = self.numbers()
         clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
         return propose(numbers, self.texts(), self.units, clocks, vocabulary, vehicle)
-
-    def doubtful_dates(self) -> list[str]:
-        """Sentences on columns of dates that do not show which number is the day."""
-        cells = {name: column.tolist() for name, column in self.texts().items()}
-        found = {name: doubt([c if isinstance(c, str) else None for c in own]) for name, own in cells.items()}
-        return [f"column {name}: {one[1]}; {one[2]}" for name, one in found.items() if one is not None]
 
     def texts(self) -> dict[str, npt.NDArray[Any]]:
         """The text columns."""
@@ -305,7 +304,7 @@ def _as_table(recording: Recording, table: LogTable | SignalLog) -> LogTable:
 
 
 def _seconds(column: npt.NDArray[Any], unit: str) -> Floats:
-    if column.dtype.kind == "M":
+    if column.dtype.kind in "mM":
         return np.asarray((column - column[0]) / np.timedelta64(1, "s"), dtype=np.float64)
     if column.dtype.kind in "iu" and len(column):
         column = column.astype(np.int64) - np.int64(column[0])

@@ -18,9 +18,9 @@ from terragrip.formats.agreement import Agreement
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.judgement import Guess, Judge
-from terragrip.formats.rim_units import radius_of
+from terragrip.formats.rim_units import own_name, radius_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
-from terragrip.recording.schema import LABELS, unit_of
+from terragrip.recording.schema import LABELS, split_channel, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -94,7 +94,13 @@ def propose(
     for name in texts:
         if name in LABELS or vocabulary.read(name).has("soil"):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
-    return proposals
+    return {_in_the_vehicle(channel, vehicle): proposal for channel, proposal in proposals.items()}
+
+
+def _in_the_vehicle(channel: str, vehicle: Vehicle | None) -> str:
+    """A wheel's channel by the name that the vehicle has for the wheel."""
+    quantity, wheel = split_channel(channel) or ("", "")
+    return f"{quantity}_{own_name(vehicle, wheel)}" if wheel else channel
 
 
 def silent(

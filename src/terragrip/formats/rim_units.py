@@ -11,6 +11,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.formats.evidence import Evidence, Path
 from terragrip.formats.judgement import Guess
+from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -93,11 +94,20 @@ class RimUnit:
         )
 
 
+def own_name(vehicle: Vehicle | None, wheel: str, vocabulary: Vocabulary = GENERAL) -> str:
+    """The name that a vehicle has for a wheel which a log names by its corner (vl for fl); the log's where it has none such."""
+    if vehicle is None or wheel in vehicle.wheels:
+        return wheel
+    meant = [one for one in vehicle.wheels if vocabulary.read(f"wheel_speed_{one}").wheel == wheel]
+    return meant[0] if len(meant) == 1 else wheel
+
+
 def radius_of(vehicle: Vehicle | None, wheel: str) -> float | None:
     """The radius [m] of a wheel that a log names: the vehicle's by that name, else the one that all its wheels have. None without."""
     if vehicle is None or not vehicle.knows_wheels:
         return None
     radii = dict(zip(vehicle.wheels, map(float, vehicle.wheel_radius), strict=True))
+    wheel = own_name(vehicle, wheel)
     if wheel in radii:
         return radii[wheel]
     return max(radii.values()) if max(radii.values()) < 1.03 * min(radii.values()) else None

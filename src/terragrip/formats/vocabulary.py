@@ -17,7 +17,7 @@ from terragrip.units import is_common
 MEANINGS: dict[str, str] = {
     # what is measured
     "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad velocita snelheid",
-    "rotation": "rpm rps omega w rotation drehzahl toerental",
+    "rotation": "rpm rps omega w rotation drehzahl toerental regime",
     "torque": "torque effort moment drehmoment tau tq trq md couple par coppia koppel",
     "current": "current curr amps amp ampere strom",
     "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
@@ -36,12 +36,13 @@ MEANINGS: dict[str, str] = {
     "force": "force kraft fuerza forza",
     "mass": "mass weight masse gewicht poids peso massa",
     "distance": "distance odometer",
-    "time": "time timestamp stamp unix epoch clock utc zeit temps tiempo tempo tijd tow",
+    "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow",
     # what it is of
     "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical",
     "motor": "motor moteur motore antrieb antriebs esc",
-    "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam",
-    "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd",
+    "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam "
+    "grund boden sol suelo suolo",
+    "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd avancement",
     "odometry": "odom odometry",
     "soil": "soil terrain surface",
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
@@ -97,6 +98,8 @@ _SYMBOLS = {
 }
 _AXIS_SYMBOLS = {"a": "acceleration", "g": "gyro", "w": "gyro", "v": "speed", "f": "force"}
 _COMPASS = {"n": "north", "e": "east", "d": "vertical", "u": "vertical"}
+_ELISION = re.compile(r"\b[dl]['\u2019](?=\w)", re.IGNORECASE)
+"""vitesse d'avancement"""
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
@@ -283,7 +286,8 @@ GENERAL = Vocabulary()
 def words_of(name: str) -> list[str]:
     """The words of a name in their order, in lower case: parts of camel case and between other characters, numbers apart."""
     result: list[str] = []
-    for part in re.split(r"[^A-Za-z0-9]+", _ordinals(_without_accents(name))):
+    plain = _ELISION.sub("", _without_accents(name))
+    for part in re.split(r"[^A-Za-z0-9]+", _ordinals(plain)):
         if part.lower() in (
             "nm",
             "kn",

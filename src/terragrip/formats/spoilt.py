@@ -1,0 +1,92 @@
+"""Columns that texts keep from being numbers or times: what stands in them, and what to write; sentences for the user, never errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.arrays import Floats
+from terragrip.formats.vocabulary import Vocabulary
+from terragrip.recording.schema import LABELS
+from terragrip.thousands import complaint
+from terragrip.written_times import FORMS, doubt
+
+_ROWS = 100_000  # of a column that are looked at
+_MOST = 0.5  # of the cells are numbers: the column is one of numbers
+_LISTED = 4  # columns that are named
+_DAYS = (3e4, 8e4)  # since 1899-12-30: 1982 to 2119; or seconds of a day,
+_STEP = 2e-4  # whose rows are never as close: 17 s in days
+
+
+def numbers_of(column: npt.NDArray[Any]) -> Floats | None:
+    """A column (n,) of numbers that are written as texts, with a point; None of any other."""
+    if column.dtype.kind != "O" or not any(isinstance(cell, str) for cell in column[:10].tolist()):
+        return None
+    try:
+        return np.array([np.nan if cell in (None, "") else float(cell) for cell in column.tolist()])
+    except (TypeError, ValueError):
+        return None
+
+
+def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, timed: bool) -> list[str]:
+    """Sentences on text columns of a log, by name (n,), that would be channels, or, where the log is not ``timed``, its time."""
+    notes = []
+    for name, column in texts.items():
+        cells = [cell.strip() if isinstance(cell, str) else None for cell in column[:_ROWS].tolist()]
+        read = vocabulary.read(name)
+        found = doubt(cells)
+        if found is not None:
+            notes += [] if timed else [f"column {name}, row {found[0] + 1}: {found[1]}; {found[2]}."]
+        elif name not in LABELS:
+            notes += _of_numbers(name, cells)
+            if not notes and not timed and read.has("time") and any(cells):
+                first = next(row for row, cell in enumerate(cells) if cell)
+                notes.append(f"column {name}, row {first + 1}: {cells[first]!r} is no time; {FORMS}.")
+    return notes[:_LISTED] + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
+
+
+def days_in(numbers: Mapping[str, Floats], vocabulary: Vocabulary) -> list[str]:
+    """Sentences on columns of numbers, by name (n,), that go by the name of a time and count days, as a spreadsheet's dates do."""
+    notes = []
+    for name, values in numbers.items():
+        known = values[np.isfinite(values)]
+        if len(known) < 2 or not vocabulary.read(name).has("time"):
+            continue
+        low, high = float(known.min()), float(known.max())
+        step = float(np.median(np.abs(np.diff(known))))
+        if _DAYS[0] < low and high < _DAYS[1] and 0 < step < _STEP:
+            day = np.datetime64("1899-12-30") + np.timedelta64(int(low), "D")
+            notes.append(
+                f"column {name} counts days, as a spreadsheet's dates do ({low:.6g} is {day}): write 2024-04-03 10:00:00.5."
+            )
+    return notes
+
+
+def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:
+    """A sentence where most of the cells are numbers: on the first that is none, or on their decimal comma."""
+    known = [(row, cell) for row, cell in enumerate(cells) if cell]
+    good = {cell: _is_number(cell.replace(",", ".")) for cell in {cell for _, cell in known}}
+    if not known or np.mean([good[cell] or complaint(cell) is not None for _, cell in known]) <= _MOST:
+        return
+    bad = next(((row, cell) for row, cell in known if not good[cell]), None)
+    if bad is None:
+        yield f"column {name} holds numbers with a decimal comma as texts: write numbers."
+        return
+    count = sum(not good[cell] for _, cell in known)
+    others = f" (and {count - 1} more)" if count > 1 else ""
+    problem, hint = complaint(bad[1]) or (
+        f"{bad[1][:30]!r} is not a number, as most cells there are",
+        "leave it empty, or correct it",
+    )
+    yield f"column {name}, row {bad[0] + 1}{others}: {problem}; {hint}."
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,116 @@
+"""What keeps a column of a foreign log from being a number or a time is named by `inspect`, with its row and what to write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.formats import Profile, inspect, read
+from terragrip.vehicle import Vehicle
+
+NAMES = ("Zeit", "Fahrgeschwindigkeit [km/h]", "Raddrehzahl VL [1/min]", "Raddrehzahl VR [1/min]", "Raddrehzahl HL [1/min]",
+         "Raddrehzahl HR [1/min]", "Radmoment VL [Nm]")  # fmt: skip
+ROWS = 300
+
+
+def table() -> pd.DataFrame:
+    """A drive of 1 to 2 m/s at 10 Hz on wheels of .3 m."""
+    time = np.arange(ROWS) / 10
+    speed = 1.5 + 0.5 * np.sin(time / 3)
+    turning = speed / 0.95 / 0.3 * 30 / np.pi
+    columns = [time, 3.6 * speed, *[turning + 0.1 * k for k in range(4)], 40 * speed]
+    return pd.DataFrame(dict(zip(NAMES, columns, strict=True))).round(4)
+
+
+def log(
+    path: Path, column: str = "", cells: dict[int, str] | None = None, *, every: pd.Series | None = None
+) -> Path:
+    """The drive as CSV, some cells (or all) of a column written otherwise."""
+    content = table().astype(object)
+    for row, cell in (cells or {}).items():
+        content.loc[row, column] = cell
+    if every is not None:
+        content[column] = every
+    content.to_csv(path, index=False, sep=";")
+    return path
+
+
+def said(path: Path) -> str:
+    return "\n".join(inspect(path).warnings)
+
+
+@pytest.mark.parametrize("cell", ["#DIV/0!", "ERR", "---", "\u22120.35", "Mittelwert"])
+def test_a_text_among_numbers_is_named_with_its_row(tmp_path: Path, cell: str) -> None:
+    note = said(log(tmp_path / "a.csv", NAMES[1], {99: cell, 199: cell}))
+    assert (
+        f"column Fahrgeschwindigkeit, row 100 (and 1 more): {cell!r} is not a number, as most cells there are; leave it empty"
+        in note
+    )
+    assert "is not a number" not in said(log(tmp_path / "b.csv"))
+
+
+def test_signs_between_thousands_are_named(tmp_path: Path) -> None:
+    grouped = (100 * table()[NAMES[6]]).map("{:,.1f}".format)
+    note = said(log(tmp_path / "a.csv", NAMES[6], every=grouped))
+    assert "column Radmoment VL, row 1" in note
+    assert "write numbers without a sign between thousands" in note
+
+
+@pytest.mark.parametrize("form", ["%M:%S.0", "%d.%m.%y %H:%M:%S", "%d.%m.%Y %H:%M"])
+def test_a_time_in_another_form_is_named(tmp_path: Path, form: str) -> None:
+    stamps = pd.Series(
+        pd.Timestamp("2024-04-13 10:00") + pd.to_timedelta(np.arange(ROWS), unit="min")
+    ).dt.strftime(form)
+    note = said(log(tmp_path / "a.csv", "Zeit", every=stamps))
+    assert (
+        f"column Zeit, row 1: {stamps[0]!r} is no time; give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5."
+        in note
+    )
+
+
+def test_days_of_a_spreadsheet_are_named(tmp_path: Path) -> None:
+    days = 45385.4166667 + table()["Zeit"] / 86_400
+    assert "column Zeit counts days, as a spreadsheet's dates do (45385.4 is 2024-04-03)" in said(
+        log(tmp_path / "a.csv", "Zeit", every=days)
+    )
+
+
+def test_numbers_as_texts_and_durations_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    table().astype(str).assign(Zeit=pd.to_timedelta(table()["Zeit"], unit="s")).to_parquet(path)
+    seen = inspect(path)
+    assert seen.time is not None
+    assert {"ground_speed", "wheel_speed_fl", "drive_torque_fl"} <= seen.proposals.keys()
+    (tmp_path / "p.yaml").write_text(seen.profile, encoding="utf-8")
+    recording = read(path, Profile.load(tmp_path / "p.yaml"))
+    assert recording.time[-1] == pytest.approx((ROWS - 1) / 10)
+    np.testing.assert_allclose(recording["ground_speed"], table()[NAMES[1]] / 3.6)
+    table().astype(str).apply(lambda column: column.str.replace(".", ",")).to_parquet(path)
+    assert "column Fahrgeschwindigkeit [km/h] holds numbers with a decimal comma as texts" in said(path)
+
+
+def test_json_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    table().to_json(path, orient="records", lines=True)
+    with pytest.raises(InputError, match="is JSON; save it as CSV or Parquet"):
+        inspect(path)
+
+
+def test_wheels_go_by_the_vehicles_own_names(tmp_path: Path) -> None:
+    """A German vehicle file, whose radii tell the unit, too."""
+    axles = {"vorn": {"mass": 190, "wheels": ["vl", "vr"]}, "hinten": {"mass": 230, "wheels": ["hl", "hr"]}}
+    wheel = {"radius": 0.3, "inertia": 1.6}
+    vehicle = Vehicle.from_dict(
+        {"mass": 420, "wheelbase": 1.1, "center_of_gravity_height": 0.5, "axles": axles, "wheel": wheel}
+    )
+    content = table()
+    content.columns = [name.removesuffix(" [1/min]") for name in NAMES]
+    content.to_csv(tmp_path / "a.csv", index=False)
+    proposals = inspect(tmp_path / "a.csv", vehicle=vehicle).proposals
+    assert {f"wheel_speed_{wheel}" for wheel in vehicle.wheels} <= proposals.keys()
+    assert proposals["wheel_speed_hl"].unit == "rpm"
+    assert not any(name.endswith(("_fl", "_rr")) for name in proposals)
