@@ -74,7 +74,7 @@ OTHERS: dict[str, dict[str, tuple[object, str | None]]] = {
         "ground_speed": ("CAN2.gnss_speed.Speed", "m/s"), "latitude": ("CAN2.gnss_pos.Latitude", "deg"),
         "longitude": ("CAN2.gnss_pos.Longitude", "deg"), "engine_speed": ("CAN1.EEC1.EngineSpeed", "rpm"),
         "engine_torque_share": ("CAN1.EEC1.ActualEnginePercentTorque", "%"),
-        "engine_friction_share": ("CAN1.EEC3.NominalFrictionPercentTorque", "%"),
+        "engine_friction_share": ("CAN1.EEC3.NominalFrictionPercentTorque", "%"), "fuel_rate": ("CAN1.LFE1.EngineFuelRate", "l/h"),
     },
 }  # fmt: skip
 
