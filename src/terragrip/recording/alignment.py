@@ -12,6 +12,7 @@ import numpy.typing as npt
 from terragrip.recording.held import held_period
 from terragrip.recording.lag import Lag, delay_of, is_copy, lag_within, measured
 from terragrip.recording.noise import white_noise
+from terragrip.recording.ranks import median
 from terragrip.recording.survey import ROWS, first_speeds
 from terragrip.recording.table import Recording
 
@@ -86,7 +87,7 @@ class _Shift:
             for n in columns
             if n == "ground_speed" or (n != "wheel_based_speed" and is_copy(columns[n], ground))
         ]
-        longest = max(_LONGEST, 3 * float(np.median(np.diff(when))))
+        longest = max(_LONGEST, 3 * median(np.diff(when)))
         samples = {n: s for n in late if (s := measured(time, columns[n])) is not None}
         known = {n: sd for n, s in samples.items() if (sd := white_noise(*s)) is not None}
         return cls(lag, tuple(late), longest, held_period(when, kept) is not None, known)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from terragrip.physics.loads import axle_loads
 from terragrip.recording.mechanics import Means
+from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -48,13 +49,13 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
     known = np.isfinite(total) & straight
     if not known.any():
         return []
-    rows = known & (total > _PULLING * max(float(np.quantile(total[known], 0.95)), 0.0))
+    rows = known & (total > _PULLING * max(quantile(total[known], 0.95), 0.0))
     if rows.sum() < _LEAST:
         return []
     pulls = _pulls(recording, vehicle, means, total)
     for a, b in combinations(driven, 2):
-        mean = float(np.median((slip[a] + slip[b])[rows])) / 2
-        if mean < _SLIP or abs(float(np.median((slip[a] - slip[b])[rows]))) > _ALIKE * mean:
+        mean = median((slip[a] + slip[b])[rows]) / 2
+        if mean < _SLIP or abs(median((slip[a] - slip[b])[rows])) > _ALIKE * mean:
             continue
         exchanged = vehicle.axle_mass.copy()
         exchanged[[a, b]] = exchanged[[b, a]]
@@ -118,5 +119,5 @@ def _difference(
         acceleration=means.change,
         slope=np.arcsin(np.clip(climb / STANDARD_GRAVITY, -1.0, 1.0)),
     )
-    first, second = (float(np.median((thrust[k] / np.maximum(loads[:, k], 1e-9))[rows])) for k in pair)
+    first, second = (median((thrust[k] / np.maximum(loads[:, k], 1e-9))[rows]) for k in pair)
     return float(np.log(first / second)) if min(first, second) > 0 and loads[rows].min() > 0 else 0.0

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from terragrip.errors import InputError, nearest
 from terragrip.recording.clock import clock_unit
+from terragrip.recording.ranks import median
 from terragrip.recording.schema import LABELS, TIME, is_channel
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: 
     known = known[np.isfinite(known)]
     if not len(known):
         return
-    middle = float(np.median(known))
+    middle = median(known)
     if MASSES[0] * vehicle.mass <= middle <= MASSES[1] * vehicle.mass:
         return
     hint = (

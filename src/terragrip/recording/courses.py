@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from terragrip.recording.ranks import median
+
 Floats = npt.NDArray[np.float64]
 
 STEP = 0.05
@@ -23,7 +25,7 @@ def points_of(time: Floats, most: float = MOST_TIME) -> tuple[Floats, float] | N
     too far apart to show what changes within seconds."""
     if time[-1] - time[0] < LEAST_TIME:
         return None
-    step = max(STEP, float(np.median(np.diff(time))))
+    step = max(STEP, median(np.diff(time)))
     if 2 * step >= _SLOW:
         return None
     points = np.arange(time[0], min(time[-1], time[0] + most), step)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.held import quantum
+from terragrip.recording.held import known_part, quantum
+from terragrip.recording.ranks import median, quantile
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -76,7 +77,7 @@ def _standing(recording: Recording, rims: list[str]) -> list[str]:
     ground, notes = recording.channels.get("ground_speed"), []
     if ground is None or len(rims) < 2 or not np.isfinite(ground).any():
         return []
-    if not any(_may_last(*_known(recording.time, recording.channels[name])) for name in rims):
+    if not any(_may_last(*known_part(recording.time, recording.channels[name])) for name in rims):
         return []
     zero = {name: recording.channels[name] == 0.0 for name in rims}
     driving = np.abs(ground) > _DRIVING * float(np.nanquantile(np.abs(ground), 0.95))
@@ -98,7 +99,7 @@ def _off(time: Floats, torques: dict[str, Floats]) -> list[str]:
     notes = []
     for name, values in torques.items():
         others = [other for one, other in torques.items() if one != name]
-        if not others or not _may_last(*_known(time, values)) or _is_one_value(values):
+        if not others or not _may_last(*known_part(time, values)) or _is_one_value(values):
             continue
         alone = (values == 0.0) & np.logical_and.reduce([other != 0.0 for other in others])
         stretch = _longest(time, alone, np.isfinite(values))
@@ -118,18 +119,14 @@ def _hung(recording: Recording) -> list[str]:
     channels = [v for v in recording.channels.values() if not _is_one_value(v) and np.isfinite(v).all()]
     if len(channels) < _SEVERAL:
         return []
-    time, same = recording.time[1:], np.abs(ground[1:]) > _DRIVING * float(np.quantile(np.abs(ground), 0.95))
+    time, same = recording.time[1:], np.abs(ground[1:]) > _DRIVING * quantile(np.abs(ground), 0.95)
     for values in channels:
         if not same.any():
             return []
         same &= values[1:] == values[:-1]
     stretch = _longest(time, same, np.ones(len(same), dtype=bool))
     changes = time[ground[1:] != ground[:-1]]
-    if (
-        stretch is None
-        or len(changes) < 3
-        or stretch[1] - stretch[0] < _TIMES * float(np.median(np.diff(changes)))
-    ):
+    if stretch is None or len(changes) < 3 or stretch[1] - stretch[0] < _TIMES * median(np.diff(changes)):
         return []
     return [
         f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
@@ -154,7 +151,7 @@ def _longest(time: Floats, rows: Bools, known: Bools) -> tuple[float, float] | N
 def _gaps(when: Floats) -> Bools:
     """Where samples at these instants (n,) are missing (n - 1,): no value is repeated across."""
     steps = np.diff(when)
-    return steps > max(_GAP, _APART * float(np.median(steps))) if len(steps) else np.zeros(0, dtype=bool)
+    return steps > max(_GAP, _APART * median(steps)) if len(steps) else np.zeros(0, dtype=bool)
 
 
 def _speeds(recording: Recording) -> dict[str, Floats]:
@@ -181,14 +178,14 @@ def _repeats(
 ) -> list[str]:
     """A sentence on the longest run of one value while others change much. Speeds that are 0 may stand; ``forces`` that are 0 may be
     switched off, and at their limits be as great as they can."""
-    when, what = _known(time, values)
+    when, what = known_part(time, values)
     if not others or not _may_last(when, what) or _is_one_value(what):
         return []
     first = np.flatnonzero(np.r_[True, (np.diff(what) != 0.0) | _gaps(when)])
     last = np.r_[first[1:], len(what)] - 1
     lasting = when[last] - when[first]
-    usual = float(np.median(np.diff(when[first]))) if len(first) > 2 else np.inf
-    step, size = quantum(what), float(np.quantile(np.abs(what), 0.95))
+    usual = median(np.diff(when[first])) if len(first) > 2 else np.inf
+    step, size = quantum(what), quantile(np.abs(what), 0.95)
     if step > _COARSE * size and _by_steps(what, step):
         return (
             []
@@ -218,20 +215,12 @@ def _repeats(
     ]
 
 
-def _known(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Instants and values (m,) of the samples (n,) that there are."""
-    if np.isfinite(values.sum()):  # a fifth of the time of a look at each
-        return time, values
-    there = np.isfinite(values)
-    return time[there], values[there]
-
-
 def _may_last(when: Floats, what: Floats) -> bool:
     """Whether a value may be repeated for `_LONG`: a quick look at some of the samples (n,)."""
     if len(when) < _LOOKS:
         return False
     every = max(1, len(when) // _FEW)
-    step = float(np.quantile(np.diff(when[::every]), 0.95)) / every
+    step = quantile(np.diff(when[::every]), 0.95) / every
     alike = np.diff(what[:: max(1, int(_LONG / _LOOKS / max(step, 1e-9)))]) == 0.0
     least = _LOOKS // 2 - 1
     return len(alike) >= least and bool(sliding_window_view(alike, least).all(axis=1).any())
@@ -240,4 +229,4 @@ def _may_last(when: Floats, what: Floats) -> bool:
 def _changes(other: Floats, rows: Bools) -> bool:
     """Whether another speed (n,) changes much within ``rows`` (n,)."""
     size = np.abs(other[np.isfinite(other)])
-    return bool(len(size)) and _range(other[rows]) > _CHANGED * float(np.quantile(size, 0.95)) > 0.0
+    return bool(len(size)) and _range(other[rows]) > _CHANGED * quantile(size, 0.95) > 0.0

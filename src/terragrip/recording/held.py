@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.chunks import sampled_rows
+from terragrip.recording.ranks import median
 from terragrip.recording.schema import REFERENCE
 
 if TYPE_CHECKING:
@@ -61,13 +62,13 @@ def held_period(time: Floats, values: Floats) -> float | None:
     if len(lengths) < _FEWEST_RUNS:
         return None
     # A Gaussian increment of median size m quanta repeats with probability 0.27/m; three times that is not chance.
-    by_chance = 0.8 / float(np.median(in_quanta))
-    typical = float(np.median(lasting))
+    by_chance = 0.8 / median(in_quanta)
+    typical = median(lasting)
     alike = (lasting > 0.49 * typical) & (lasting < 2.1 * typical)
     if np.mean(lengths >= 2) <= max(0.2, by_chance) or alike.mean() < _REGULAR_SHARE:
         return None
     # Twice the median is a missed update, unless updates come almost with every row.
-    return float(lasting[alike & ((lasting < 1.7 * typical) | (np.median(lengths) < 2))].mean())
+    return float(lasting[alike & ((lasting < 1.7 * typical) | (median(lengths) < 2))].mean())
 
 
 def fresh_samples(time: Floats, values: Floats, period: float) -> npt.NDArray[np.bool_]:
@@ -127,7 +128,11 @@ def quantum(values: Floats) -> float:
 def measured_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """The measured samples of a channel; of a long one those in the log's sample (`sampled_rows`)."""
     rows = sampled_rows(len(values))
-    time, values = time[rows], values[rows]
+    return known_part(time[rows], values[rows])
+
+
+def known_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """The samples of a channel that are numbers; where all are, the arrays themselves."""
     known = np.isfinite(values)
     return (time, values) if known.all() else (time[known], values[known])
 

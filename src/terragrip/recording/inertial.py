@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.lag import STIFFNESS, measured
+from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -64,7 +65,9 @@ def _courses(
     if not rims:
         return None
     rim = np.mean(list(rims.values()), axis=0)
-    fast = np.abs(rim) > _MOVING * float(np.quantile(np.abs(rim), 0.95))
+    fast = np.abs(rim) > _MOVING * quantile(np.abs(rim), 0.95)
+    if not fast.any():
+        return None
     sides = [
         rims[axle.wheels[-1]] - rims[axle.wheels[0]]
         for axle in vehicle.axles.values()
@@ -79,7 +82,7 @@ def _courses(
         for name, values in own.items()
         if values is not None
     }
-    return step, float(np.median(np.abs(rim[fast]))), pairs
+    return step, median(np.abs(rim[fast])), pairs
 
 
 def _lag(own: Floats, wheels: Floats, step: float, speed: float) -> float:

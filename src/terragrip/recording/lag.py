@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.recording.held import fresh_samples, held_period
+from terragrip.recording.held import fresh_samples, held_period, known_part
+from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
 
 Floats = npt.NDArray[np.float64]
 
 _STEP = 0.05  # s between the points on which speeds are compared
+_BRIDGED = 1.0  # s, or three samples, between two samples
 _LEAST_OVERLAP = 20.0  # s
 _LEAST_SHARE = 0.3  # of the shorter record
 _LEAST_CORRELATION = 0.8
@@ -28,7 +30,7 @@ _WIDTH = 20  # points over which rates are smoothed: a second
 _ROUNDS = 5
 _LEAST_STD = 0.005  # s
 _LONGEST = 20_000_000  # points; a record over ten days
-
+_FEW = 1000  # samples
 
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
 _SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 3.4 (docs/formats.md)
@@ -101,8 +103,8 @@ def speed_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | N
     ground = measured(time, columns.get("ground_speed"))
     if ground is not None:
         speed = np.abs(ground[1])
-        moving = speed[speed > 0.5 * float(np.quantile(speed, 0.9))]
-        return Speed(ground[0], speed, float(np.median(moving)) if len(moving) else 0.0)
+        moving = speed[speed > 0.5 * quantile(speed, 0.9)]
+        return Speed(ground[0], speed, median(moving) if len(moving) else 0.0)
     return wheels_of(time, columns)
 
 
@@ -112,7 +114,10 @@ def wheels_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | 
     if based is not None:
         return Speed(based[0], np.abs(based[1]), None)
     wheels = [measured(time, v) for name, v in columns.items() if name.startswith("wheel_speed_")]
-    known = [np.interp(time, when, np.abs(values)) for when, values in filter(None, wheels)]
+    known = [
+        np.abs(values) if when is time else np.interp(time, when, np.abs(values))
+        for when, values in filter(None, wheels)
+    ]
     return Speed(time, np.mean(known, axis=0), None) if known else None
 
 
@@ -120,8 +125,7 @@ def measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Flo
     """The true updates (m,) of a channel, since a held value is late by half its period; None if there are hardly any."""
     if values is None or values.dtype.kind not in "fiu":
         return None
-    known = np.isfinite(values)
-    when, kept = time[known], np.asarray(values[known], np.float64)
+    when, kept = known_part(time, np.asarray(values, np.float64))
     period = held_period(when, kept)
     if period is not None:
         fresh = fresh_samples(when, kept, period)
@@ -166,11 +170,15 @@ def delay_of(lag: Lag | None) -> float:
 
 def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
     """Whether a wheel's speed was computed from the ground speed, as for a free wheel without a sensor: it has the ground speed's lag."""
-    known = np.isfinite(turning) & np.isfinite(ground)
-    if not np.array_equal(known, np.isfinite(turning)) or not np.any(ground[known]):
+    known = np.isfinite(turning)
+    if not np.isfinite(ground[known]).all() or not np.any(ground[known]):
         return False
-    scale = float(np.sum(turning[known] * ground[known]) / np.sum(ground[known] ** 2))
-    return bool(np.allclose(turning[known], scale * ground[known], rtol=1e-6, atol=1e-9))
+    turning, ground = turning[known], ground[known]
+    scale = float(np.sum(turning * ground) / np.sum(ground**2))
+    few = slice(_FEW)  # of most wheels they show it already
+    return all(
+        np.allclose(turning[rows], scale * ground[rows], rtol=1e-6, atol=1e-9) for rows in (few, slice(None))
+    )
 
 
 def offset_between(
@@ -185,10 +193,13 @@ def offset_between(
     first, second = _regular(*reference), _regular(*other)
     if first is None or second is None or len(first[1]) + len(second[1]) > _LONGEST:
         return None
-    correlation, lags = _correlation(first[1], second[1])
+    lags = np.arange(1 - len(second[1]), len(first[1]))
     shift = second[0] - first[0] - _STEP * lags  # to subtract from the second clock
     if reach is not None:
-        correlation = np.where(np.abs(shift) <= reach, correlation, -np.inf)
+        lags, shift = lags[np.abs(shift) <= reach], shift[np.abs(shift) <= reach]
+    if not len(lags):
+        return None
+    correlation = _correlation(first[1], second[1], lags)
     best = int(np.argmax(correlation))
     if not correlation[best] >= _LEAST_CORRELATION:
         return None
@@ -205,19 +216,20 @@ def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
     time, speed = time[known], speed[known]
     if len(time) < 3 or time[-1] - time[0] < _LEAST_OVERLAP or (time[-1] - time[0]) / _STEP > _LONGEST:
         return None
-    points = np.arange(time[0], time[-1], _STEP)
+    points, steps = np.arange(time[0], time[-1], _STEP), np.diff(time)
     values = np.interp(points, time, speed)
-    after = np.clip(np.searchsorted(time, points), 1, len(time) - 1)
-    longest = max(1.0, 3.0 * float(np.median(np.diff(time))))
-    values[time[after] - time[after - 1] > longest] = np.nan
+    if steps.max() > _BRIDGED:
+        after = np.clip(np.searchsorted(time, points), 1, len(time) - 1)
+        values[steps[after - 1] > max(_BRIDGED, 3.0 * median(steps))] = np.nan
     return float(time[0]), values
 
 
-def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
-    """Correlation of a (n,) with b (m,) over their common part, at each lag of b by whole points."""
+def _correlation(a: Floats, b: Floats, lags: npt.NDArray[np.intp]) -> Floats:
+    """Correlation of a (n,) with b (m,) over their common part, at lags of b by whole points (k,), increasing."""
     from numpy.fft import irfft, rfft
 
-    size = 1 << (len(a) + len(b) - 2).bit_length()
+    # room for both, and so much more that no overlap from the other end reaches a lag that is wanted
+    size = 1 << (max(len(a), len(b), len(a) - int(lags[0]), len(b) + int(lags[-1])) - 1).bit_length()
     masks = [np.isfinite(x).astype(np.float64) for x in (a, b)]
     values = [
         np.where(m > 0, x - np.nansum(x) / max(m.sum(), 1.0), 0.0) for x, m in zip((a, b), masks, strict=True)
@@ -227,7 +239,7 @@ def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
     sa, sb = rfft(values[0] ** 2, size), np.conj(rfft(values[1] ** 2, size))
 
     def at_lags(product: npt.NDArray[np.complex128]) -> Floats:
-        return np.asarray(irfft(product, size))
+        return np.asarray(irfft(product, size)[lags])
 
     count = np.maximum(np.round(at_lags(ma * mb)), 0.0)
     common = np.maximum(count, 1.0)
@@ -239,10 +251,7 @@ def _correlation(a: Floats, b: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:
     enough = count >= max(_LEAST_OVERLAP / _STEP, _LEAST_SHARE * min(masks[0].sum(), masks[1].sum()))
     with np.errstate(invalid="ignore", divide="ignore"):
         result = cross / np.sqrt(np.maximum(spread_a, floor) * np.maximum(spread_b, floor))
-    lags = np.arange(size)
-    lags = np.where(lags < len(a), lags, lags - size)
-    order = np.argsort(lags)
-    return np.where(enough, result, -np.inf)[order], lags[order]
+    return np.where(enough, result, -np.inf)
 
 
 def _refined(
@@ -273,7 +282,7 @@ def _refined(
             normal = design.T @ (weight[:, None] * design) + 1e-12 * np.eye(2)
             result = np.linalg.solve(normal, design.T @ (weight * target))
             rest = target - design @ result
-            scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-9)
+            scale = max(1.4826 * median(np.abs(rest)), 1e-9)
             weight = np.clip(1.0 - (rest / (4.7 * scale)) ** 2, 0.0, None) ** 2
         if result[0] <= 0:
             break
@@ -292,8 +301,10 @@ def _smooth(values: Floats) -> Floats:
     half = _WIDTH // 2
     sums = np.r_[0.0, np.cumsum(np.nan_to_num(values))]
     missing = np.r_[0, np.cumsum(np.isnan(values))]
+    inner = max(len(values) - 2 * half, 0)
+    whole = missing[len(sums) - inner :] == missing[:inner]
     result = np.full(len(values), np.nan)
-    inner = np.arange(half, len(values) - half)
-    whole = missing[inner + half + 1] == missing[inner - half]
-    result[inner] = np.where(whole, (sums[inner + half + 1] - sums[inner - half]) / (2 * half + 1), np.nan)
+    result[half : half + inner] = np.where(
+        whole, (sums[len(sums) - inner :] - sums[:inner]) / (2 * half + 1), np.nan
+    )
     return result

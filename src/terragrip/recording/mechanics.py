@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.pitch import pitch_warnings
+from terragrip.recording.ranks import median, quantile
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -146,7 +147,7 @@ def means_of(recording: Recording) -> Means | None:
     known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
     if speed is None or len(known) < _LEAST:
         return None
-    length = max(_WINDOW, 2 * float(np.median(np.diff(recording.time[known]))))
+    length = max(_WINDOW, 2 * median(np.diff(recording.time[known])))
     place = ((recording.time - recording.time[0]) / length).astype(np.intp)
     count = int(place[-1]) + 1
     if place.min() < 0 or place.max() >= count:  # time decreases: refused elsewhere
@@ -295,7 +296,7 @@ def _pull_warnings(
             f"The drive torques over the wheel radius are {rest + pulled:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
             "which leaves nothing that could drive the vehicle: check the units of both, and that each wheel's torque is there."
         ]
-    if 0 < float(np.quantile(np.abs(pull[known]), 0.95)) < _NO_PULL:
+    if 0 < quantile(np.abs(pull[known]), 0.95) < _NO_PULL:
         return [
             "drawbar_force stays below a thousandth of the weight: it may be in kN: write 'unit: kN' for it in the profile."
         ]
@@ -308,7 +309,7 @@ def _offset_warnings(means: Means, forward: Floats) -> list[str]:
         return []
     rest = forward - means.change - means.climb
     known = np.isfinite(rest)
-    offset = float(np.median(rest[known])) if known.sum() >= _LEAST else 0.0
+    offset = median(rest[known]) if known.sum() >= _LEAST else 0.0
     if abs(offset) < _OFFSET:
         return []
     return [
@@ -348,7 +349,7 @@ def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> li
         with np.errstate(invalid="ignore", divide="ignore"):
             rolled = np.abs(means.speed / window_means(turning, means.place, means.count)[means.rows])
         light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
-        shown = float(np.median(rolled[light])) if light.sum() >= _LEAST else radius
+        shown = median(rolled[light]) if light.sum() >= _LEAST else radius
         if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:
             off[wheel] = shown
     if not off:

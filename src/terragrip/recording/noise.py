@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.held import fresh_samples, held_periods, measured_part, quantum
+from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import REFERENCE
 
 if TYPE_CHECKING:
@@ -68,6 +69,6 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     apart = when[:, :, None] - when[:, None, :] + np.eye(4)
     weight = 1.0 / apart.prod(axis=2)
     third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
-    scale = _MAD_TO_SD * float(np.median(np.abs(third)))
+    scale = _MAD_TO_SD * median(np.abs(third))
     floor = quantum(values) / np.sqrt(12.0)
-    return max(scale, floor, 1e-4 * float(np.quantile(np.abs(values), 0.95)))
+    return max(scale, floor, 1e-4 * quantile(np.abs(values), 0.95))

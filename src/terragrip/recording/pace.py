@@ -10,6 +10,7 @@ from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.held import measured_part
 from terragrip.recording.noise import white_noise
+from terragrip.recording.ranks import median, quantile
 from terragrip.recording.turns import filled
 
 if TYPE_CHECKING:
@@ -98,10 +99,10 @@ def _changes(time: Floats, speed: Floats, rims: list[tuple[float, Floats]]) -> f
         a, b = speed[rows + lag] - speed[rows], _mean(rims, rows + lag) - before
         both = np.minimum(np.abs(a), np.abs(b))
         if lag == 1:
-            scatter = 3 * float(np.median(both))
+            scatter = 3 * median(both)
             continue
-        passed = float(np.median(time[rows + lag] - time[rows]))
-        fast = float(np.quantile(np.where(a * b > 0, both, 0.0), _OFTEN))
+        passed = median(time[rows + lag] - time[rows])
+        fast = quantile(np.where(a * b > 0, both, 0.0), _OFTEN)
         most = max(most, (fast - scatter) / passed)
     return most
 

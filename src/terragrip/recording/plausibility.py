@@ -13,6 +13,7 @@ from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, odometry_warnings
+from terragrip.recording.ranks import median, quantile
 from terragrip.recording.reverse import reverse_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
@@ -198,7 +199,7 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> f
     north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
     chord, made = np.hypot(np.diff(north), np.diff(east)), np.diff(np.interp(edges, recording.time, way))
     moving = made > 0.3 * _high(made)
-    return float(np.median(chord[moving] / np.maximum(made[moving], 1e-9))) if moving.any() else 0.0
+    return median(chord[moving] / np.maximum(made[moving], 1e-9)) if moving.any() else 0.0
 
 
 def _shown_turn(recording: Recording, track: Track | None) -> Floats | None:
@@ -329,7 +330,7 @@ def _ratio(time: Floats, speed: Floats, other: Floats) -> float | None:
         return None
     ground, rim = np.abs(pairs[0]), np.abs(pairs[1])
     moving = (ground > 0.3 * _high(ground)) & (rim > 0.3 * _high(rim)) & (ground > 0) & (rim > 0)
-    return float(np.median(rim[moving] / ground[moving])) if moving.sum() >= 10 else None
+    return median(rim[moving] / ground[moving]) if moving.sum() >= 10 else None
 
 
 def _high(values: Floats) -> float:
@@ -347,9 +348,7 @@ def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats
     if len(known) < 2 or len(rows) < 2:
         return None
     after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
-    rows = rows[
-        time[known[after]] - time[known[after - 1]] < max(_GAP, 3 * float(np.median(np.diff(time[known]))))
-    ]
+    rows = rows[time[known[after]] - time[known[after - 1]] < max(_GAP, 3 * median(np.diff(time[known])))]
     if not len(rows):
         return None
     rows = rows[:: max(1, len(rows) // _ENOUGH)]
@@ -385,7 +384,7 @@ def _time_warnings(recording: Recording) -> list[str]:
     if len(recording) < 10:
         return []
     step = np.diff(recording.time)
-    spacing = float(np.median(step[:: max(1, len(step) // _ENOUGH)]))
+    spacing = median(step[:: max(1, len(step) // _ENOUGH)])
     mean = float(recording.time[-1] - recording.time[0]) / len(
         step
     )  # instants of two clocks may be close by chance
@@ -397,4 +396,4 @@ def _time_warnings(recording: Recording) -> list[str]:
 def _typical_size(recording: Recording, name: str) -> float | None:
     values = recording.channels.get(name)
     known = None if values is None else np.abs(values[np.isfinite(values)])
-    return None if known is None or not len(known) else float(np.quantile(known, 0.95))
+    return None if known is None or not len(known) else quantile(known, 0.95)

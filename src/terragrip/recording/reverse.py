@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
 
 if TYPE_CHECKING:
@@ -78,6 +79,4 @@ def _large(values: Floats) -> Bools:
     """Which values (n,) are large beside those of the drive."""
     size = np.abs(values)
     finite = size[np.isfinite(size)]
-    return (
-        size > _FAST * float(np.quantile(finite, 0.95)) if len(finite) else np.zeros(len(values), dtype=bool)
-    )
+    return size > _FAST * quantile(finite, 0.95) if len(finite) else np.zeros(len(values), dtype=bool)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import LEAST_TURN, SURE, WINDOW, filled, windows
 from terragrip.units import STANDARD_GRAVITY
 
@@ -109,9 +110,7 @@ class _Drive:
             return None
         pace = np.abs(np.mean([axle.rims for axle in axles], axis=(0, 1)))
         turned = WINDOW * float(np.abs(shown).sum())
-        return cls(
-            tuple(axles), pace, vehicle.track * shown, pace > _DRIVING * np.quantile(pace, 0.95), turned
-        )
+        return cls(tuple(axles), pace, vehicle.track * shown, pace > _DRIVING * quantile(pace, 0.95), turned)
 
     def contradicts(self, axle: _Axle) -> bool:
         """Whether an axle's torques, apart from the part due to pace and pull, oppose the slips from side to side."""

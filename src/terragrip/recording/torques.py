@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means, driven_radii
+from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 
@@ -128,7 +129,7 @@ class _Course:
         force = np.gradient(smooth(rim, CALM, step), step)
         if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
             force = force + at(known("drawbar_force")) / vehicle.mass
-        moving = rim > _MOVING * float(np.quantile(rim, 0.95))
+        moving = rim > _MOVING * quantile(rim, 0.95)
         return cls(step, quick(thrust, step), quick(force, step), moving)
 
     def lag(self) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.physics.geodesy import metres_of
+from terragrip.recording.ranks import median
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -79,7 +80,7 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     if len(rows) < 10:
         return None
     time, north, east = recording.time[rows], north[rows], east[rows]
-    span = max(5, int(window / max(float(np.median(np.diff(time))), 1e-6)) | 1)
+    span = max(5, int(window / max(median(np.diff(time)), 1e-6)) | 1)
     if len(rows) < span:
         return None
     shown, half = np.lib.stride_tricks.sliding_window_view, span // 2
@@ -92,7 +93,7 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
     reach = np.ptp(ago, axis=1)
-    gap = reach > 3 * max(window, float(np.median(reach)))
+    gap = reach > 3 * max(window, median(reach))
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     altitude = _altitude(recording, time[middle])
     return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap)
@@ -120,7 +121,7 @@ def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
     freedom = ago.shape[1] - degree - 1
     left = values - sum(result[:, k, None] * powers[k] for k in place)
     square = np.sum(left**2, axis=1) / freedom
-    spread = np.sqrt(np.median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
+    spread = np.sqrt(median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
     scale = size**place
     return np.asarray(result / scale), np.asarray(spread / scale)
 
@@ -128,10 +129,10 @@ def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
 def _grade(time: Floats, speed: Floats, height: Floats) -> Floats:
     """Grade (n,) [rad]: cubics through the altitude over `_GRADE_WAY` metres, which do not flatten hills as straight lines do."""
     unknown = np.full(len(time), np.nan)
-    if np.isnan(height).all() or not (speed > _SLOWEST).any():
+    if np.isnan(height).all() or not (speed[1:] > _SLOWEST).any():
         return unknown
     way = np.r_[0.0, np.cumsum(np.diff(time) * (speed[1:] + speed[:-1]) / 2)]
-    step = float(np.median(np.diff(way)[speed[1:] > _SLOWEST])) if len(way) > 1 else 0.0
+    step = median(np.diff(way)[speed[1:] > _SLOWEST])
     span = max(7, int(_GRADE_WAY / max(step, 1e-6)) | 1)
     if len(way) < span:
         return unknown

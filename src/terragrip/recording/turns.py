@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.recording.ranks import quantile
+
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
@@ -179,7 +181,7 @@ def _uneven(
         return []
     total, pace = (torques / radii[:, None]).sum(axis=0), np.abs(rims).mean(axis=0)
     apart = np.max([np.abs(rims[right] - rims[left]) for left, right in axles], axis=0)
-    rows = (total > 0.3 * np.quantile(total, 0.95)) & (apart < _STRAIGHT * pace)
+    rows = (total > 0.3 * quantile(total, 0.95)) & (apart < _STRAIGHT * pace)
     if rows.sum() < _LEAST:
         return []
     mean = np.median(torques[:, rows], axis=1)
