@@ -14,50 +14,67 @@ tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns)
     return TG_OK;
 }
 
-/* Whole lanes of columns from the k-th on, over the last step's map, with what one SD of each constant adds on the way. */
-TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_deviations *d, int k, const int n)
+/* Columns run in `lanes` lanes, a constant, so that what their rows share is read once and sums stay in registers. */
+#define EACH(k) for (int k = 0; k < lanes * TG_LANES; k += TG_LANES)
+
+/* Over the last step's map, with what one SD of each constant adds on the way. */
+TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_deviations *d, const int n, const int lanes)
 {
-    const tg_lanes rho = lanes_load(c->s[n] + k);
-    tg_lanes v = lanes_mul_sub(lanes_all(p->g), rho, lanes_mul(lanes_all(p->keep), lanes_load(c->s[n + 1] + k)));
+    const tg_lanes keep = lanes_all(p->keep), g = lanes_all(p->g), dt = lanes_all(p->dt);
+    EACH(k)
+    {
+        const tg_lanes rho = lanes_load(c->s[n] + k);
+        lanes_store(c->prior[n] + k, rho);
+        lanes_store(c->s[n + 1] + k, lanes_mul_sub(g, rho, lanes_mul(keep, lanes_load(c->s[n + 1] + k))));
+    }
     for (int i = 0; i < n; i++) {
-        tg_real *const s = c->s[n + 2 + i] + k;
-        const tg_lanes mu = lanes_load(c->s[i] + k);
-        tg_lanes omega = lanes_mul_add(lanes_all(p->b[i]), mu, lanes_mul(lanes_all(p->phi[i]), lanes_load(s)));
-        v = lanes_mul_add(lanes_all(p->c[i]), mu, v);
-        if (d) omega = lanes_mul_add(lanes_all(p->psi[i]), lanes_load(d->wheel_acceleration[i] + k), omega);
-        lanes_store(c->prior[i] + k, mu);
-        lanes_store(c->prior[n + 2 + i] + k, omega);
-        lanes_store(s, omega);
-    }
-    if (d) v = lanes_mul_add(lanes_all(p->dt), lanes_load(d->acceleration + k), v);
-    lanes_store(c->prior[n] + k, rho);
-    lanes_store(c->prior[n + 1] + k, v);
-    lanes_store(c->s[n + 1] + k, v);
-}
-
-/* Row j of these columns after the first `taken` channels, whose residuals one SD shifts by `shift`. */
-TG_INLINE tg_lanes consider_row(const tg_consider *c, int j, int k, const tg_real (*gain)[TG_ROWS], const tg_lanes *shift, int taken)
-{
-    tg_lanes s = lanes_load(c->s[j] + k);
-    for (int m = 0; m < taken; m++) s = lanes_mul_sub(lanes_all(gain[m][j]), shift[m], s);
-    return s;
-}
-
-/* Through the gains of the channels taken, each of which sees what the ones before it left. */
-TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, int k, const int n)
-{
-    const int taken = f->taken;
-    tg_lanes shift[TG_MAX_CHANNELS];
-    for (int m = 0; m < taken; m++) {
-        const int o = f->channel[m];
-        if (o <= n) {
-            shift[m] = consider_row(c, n + 1 + o, k, gain, shift, m);
-            continue;
+        const tg_lanes phi = lanes_all(p->phi[i]), psi = lanes_all(p->psi[i]), to_omega = lanes_all(p->b[i]), to_v = lanes_all(p->c[i]);
+        EACH(k)
+        {
+            const tg_lanes mu = lanes_load(c->s[i] + k);
+            tg_lanes omega = lanes_mul_add(to_omega, mu, lanes_mul(phi, lanes_load(c->s[n + 2 + i] + k)));
+            if (d) omega = lanes_mul_add(psi, lanes_load(d->wheel_acceleration[i] + k), omega);
+            lanes_store(c->s[n + 1] + k, lanes_mul_add(to_v, mu, lanes_load(c->s[n + 1] + k)));
+            lanes_store(c->prior[i] + k, mu);
+            lanes_store(c->prior[n + 2 + i] + k, omega);
+            lanes_store(c->s[n + 2 + i] + k, omega);
         }
-        shift[m] = d ? lanes_load(d->accelerometer + k) : lanes_all(0);
-        for (int i = 0; i <= n; i++) shift[m] = lanes_mul_add(lanes_all(f->accelerometer[i]), consider_row(c, i, k, gain, shift, m), shift[m]);
     }
-    for (int j = 0; j < TG_TWICE(n); j++) lanes_store(c->s[j] + k, consider_row(c, j, k, gain, shift, taken));
+    EACH(k)
+    {
+        tg_lanes v = lanes_load(c->s[n + 1] + k);
+        if (d) v = lanes_mul_add(dt, lanes_load(d->acceleration + k), v);
+        lanes_store(c->prior[n + 1] + k, v);
+        lanes_store(c->s[n + 1] + k, v);
+    }
+}
+
+/* Through the gains of the channels taken, each of which sees what the ones before it left; one SD shifts its residual by `shift`. */
+TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, const int n, const int lanes)
+{
+    for (int m = 0; m < f->taken; m++) {
+        const int o = f->channel[m];
+        tg_real shift[TG_MAX_CONSIDERED];
+        EACH(k)
+        {
+            if (o <= n) lanes_store(shift + k, lanes_load(c->s[n + 1 + o] + k));
+            else lanes_store(shift + k, d ? lanes_load(d->accelerometer + k) : lanes_all(0));
+        }
+        for (int i = 0; o > n && i <= n; i++) {
+            const tg_lanes a = lanes_all(f->accelerometer[i]);
+            EACH(k) lanes_store(shift + k, lanes_mul_add(a, lanes_load(c->s[i] + k), lanes_load(shift + k)));
+        }
+        for (int j = 0; j < TG_TWICE(n); j++) {
+            const tg_lanes share = lanes_all(gain[m][j]);
+            EACH(k) lanes_store(c->s[j] + k, lanes_mul_sub(share, lanes_load(shift + k), lanes_load(c->s[j] + k)));
+        }
+    }
+}
+
+TG_INLINE void consider(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, const int lanes)
+{
+    consider_predict(c, &f->passage, d, f->wheels, lanes);
+    consider_update(c, f, gain, d, f->wheels, lanes);
 }
 
 /* The gains that the modes of a bank took, in the mean. */
@@ -89,9 +106,12 @@ tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviatio
     tg_real mean[TG_MAX_CHANNELS][TG_ROWS];
     if (bank) mean_gains(f, mean);
     const tg_real (*const gain)[TG_ROWS] = bank ? (const tg_real(*)[TG_ROWS])mean : f->gain;
-    for (int k = 0; k < columns; k += TG_LANES) {
-        consider_predict(c, &f->passage, deviations, k, n);
-        consider_update(c, f, gain, deviations, k, n);
+    switch ((columns + TG_LANES - 1) / TG_LANES) {
+    case 0: break;
+    case 1: consider(c, f, gain, deviations, 1); break;
+    case 2: consider(c, f, gain, deviations, 2); break;
+    case 3: consider(c, f, gain, deviations, 3); break;
+    default: consider(c, f, gain, deviations, TG_MAX_CONSIDERED / TG_LANES);
     }
     return TG_OK;
 }

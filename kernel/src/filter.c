@@ -187,6 +187,7 @@ TG_INLINE void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan
 
 TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_real *scale, tg_step *out, const int n)
 {
+    memset(out, 0, sizeof *out);
     out->channels = result->taken;
     out->nis = result->nis;
     out->log_likelihood = result->log_likelihood;
@@ -197,12 +198,9 @@ TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_r
         out->innovation_variance[c] = present ? result->variance[o] : 0;
         out->weight[c] = present ? result->weight[o] : 1;
     }
-    for (int c = n + 2; c < TG_MAX_CHANNELS; c++) out->innovation[c] = out->innovation_variance[c] = out->weight[c] = 0;
     for (int i = 0; i < n; i++) out->adaptation[i] = scale[n + 2 + i];
     out->adaptation[n] = scale[n + 1];
     for (int i = 0; i <= n; i++) out->adaptation[n + 1 + i] = scale[i];
-    for (int e = TG_TWICE(n); e < TG_MAX_STATES; e++) out->adaptation[e] = 0;
-    for (int b = 0; b < TG_MODES; b++) out->mode[b] = 0;
 }
 
 static tg_status step_with_factors(const tg_filter *f, const tgi_plan *plan, tgi_result *result)

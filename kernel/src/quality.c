@@ -30,15 +30,15 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 {
     const tg_settings *s = &e->settings;
     const tgi_constants *c = &e->constants;
-    int32_t infinite = 0, outlier = 0, measured = 0;
+    int32_t outlier = 0, measured = 0;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
         const tg_real raw = sample->value[k], value = (raw - s->offset[k]) * c->inverse_gain[k];
         const int32_t known = raw == raw && c->limit[k] > 0, sound = tgi_fabs(value) <= c->limit[k];
-        infinite |= known & (tgi_fabs(raw) > TG_LARGEST);
         outlier |= known & !sound;
         row->value[k] = sound ? value : (tg_real)NAN;
     }
-    if (infinite) return TG_NOT_FINITE;
+    for (int32_t k = 0; outlier && k < TG_SLOTS; k++)
+        if (c->limit[k] > 0 && isinf(sample->value[k])) return TG_NOT_FINITE;
     row->time = sample->time;
     if (c->holds) drop_repetitions(e, sample, row);
     for (int32_t k = TG_WHEEL_SPEED; k <= TG_GROUND_SPEED; k++) measured |= row->value[k] == row->value[k];
