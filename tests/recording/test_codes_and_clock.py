@@ -138,6 +138,20 @@ def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed
     )
 
 
+@pytest.mark.parametrize(
+    ("back", "hint"),
+    [(3.0, "sort the rows, or split the log there"), (150.0, "another log begins there, it seems: split it"),
+     (3600.0, "a clock that was set to winter time[?] Write times in UTC, or add 3600 s from there on")],
+)  # fmt: skip
+def test_a_time_that_runs_back_says_what_to_do(back: float, hint: str) -> None:
+    columns = drive()
+    time = columns["time"] - back * (columns["time"] >= 150)
+    with pytest.raises(
+        InputError, match=rf"column time, row 3001 \(time .* s\): time runs back from 149.95 s; {hint}"
+    ):
+        Recording.from_frame(columns | {"time": time})
+
+
 def test_a_ground_speed_that_is_the_wheels_own_is_named() -> None:
     columns = drive()
     own = RADIUS * np.mean([columns[f"wheel_speed_{w}"] for w in WHEELS], axis=0)

@@ -22,6 +22,7 @@ MASSES = (0.2, 10.0)
 """What a measured mass may be of the vehicle file's; the kernel passes over others (loads.c)."""
 
 _ROUNDED = 0.2  # of the stamps repeat the one before: no slip of a logger, but all of its stamps
+_HOUR, _ROUGHLY = 3600.0, 30.0  # s
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 
@@ -148,8 +149,17 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     elif time[row] == last:
         problem, hint = "time repeats", "keep one row an instant"
     else:
-        problem, hint = f"time runs back from {last:.10g} s", "sort the rows, or split the log there"
+        problem, hint = f"time runs back from {last:.10g} s", _way_out(float(last - time[row]), time, row)
     raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), hint=hint)
+
+
+def _way_out(back: float, time: Floats, row: int) -> str:
+    """What to do where time runs back by ``back`` [s] at a row."""
+    if abs(back - _HOUR) < _ROUGHLY:
+        return "a clock that was set to winter time? Write times in UTC, or add 3600 s from there on"
+    if row > 1 and time[row] <= time[1]:
+        return "another log begins there, it seems: split it"
+    return "sort the rows, or split the log there"
 
 
 def refuse_infinite(
