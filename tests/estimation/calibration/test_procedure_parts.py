@@ -136,6 +136,12 @@ def test_radii_of_passes_and_of_each_wheel(vehicle: Vehicle) -> None:
     assert "slip of 1.23 %" in together[0].sentence
     assert "over slip" not in together[0].sentence
     assert "over slip" in own[0].sentence
+    # Gains that were not told apart from radii: how far the wheels may differ is in the interval, in no value.
+    vague = procedure._radii(rolling, apart, vehicle, determined=False)
+    assert [q.value for q in vague] == pytest.approx([0.2, 0.2, 0.21, 0.21])
+    spread = np.hypot(0.003, np.hypot([0.0, 0.01, 0.01, 0.0], [0.0, 0.004, 0.004, 0.0]))
+    assert [q.std for q in vague] == pytest.approx((rolling.radius * spread).tolist())
+    assert "over slip" not in vague[0].sentence
 
 
 @pytest.mark.parametrize(

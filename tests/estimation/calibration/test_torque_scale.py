@@ -51,6 +51,16 @@ def hilly(rng: np.random.Generator, scale: float, *, push_noise: float, pitch_no
     return Recording(t, channels)
 
 
+def test_a_scale_whose_interval_holds_nothing_is_not_told(drive: Make, vehicle: Vehicle) -> None:
+    """A mild drive on a slope that nobody knows: 1.8 +- 9 was a result."""
+    log = drive(gain=0.8)
+    told = identify_torque_scale(log, vehicle)
+    unsure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drawbar_gain": 0.6}})
+    assert told.interval[0] > 0
+    with pytest.raises(InputError, match="only: an interval that holds 0"):
+        identify_torque_scale(log, unsure)
+
+
 def test_two_measures_of_the_push_undo_each_others_errors(vehicle: Vehicle) -> None:
     z, direct = [], []
     for seed in range(12):

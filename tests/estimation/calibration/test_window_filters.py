@@ -213,10 +213,13 @@ def test_runs_of_windows_end_with_a_log_and_last_long_enough() -> None:
     assert spells(wanted[:0], log[:0], 1) == []
 
 
-def test_a_standstill_begins_after_the_first_window_but_at_the_start_of_a_log(vehicle: Vehicle) -> None:
-    assert standstills(stopped((0, 4), (10, 14), (20, 23)), vehicle) == [Spell(0, 3), Spell(11, 13)]
+def test_a_standstill_leaves_out_the_windows_of_stop_and_start_but_not_a_logs_own_ends(
+    vehicle: Vehicle,
+) -> None:
+    stops = stopped((0, 4), (10, 14), (20, 23), (36, 40))
+    assert standstills(stops, vehicle) == [Spell(0, 2), Spell(11, 12), Spell(37, 39)]
     two = stopped((10, 18), recording=np.repeat([0, 1], [14, 26]))
-    assert standstills(two, vehicle) == [Spell(11, 13), Spell(14, 17)]
+    assert standstills(two, vehicle) == [Spell(11, 13), Spell(14, 16)]
     slow = stopped((10, 20))
     for value, count in ((0.029, 1), (0.031, 0)):
         slow.ground_speed[10:20] = -value
@@ -268,7 +271,7 @@ def test_a_yaw_rate_rests_at_its_mean_over_all_samples_of_standstill(vehicle: Ve
     yaw = np.where(np.arange(40) < 20, 0.02, 0.05)
     yaw[11] = np.nan
     windows = stopped((0, 6), (10, 15), (30, 35))
-    assert zeros.yaw_rate_zero(windows, vehicle, yaw) == pytest.approx((0.02 * (6 + 3) + 0.05 * 4) / 13)
+    assert zeros.yaw_rate_zero(windows, vehicle, yaw) == pytest.approx((0.02 * (5 + 2) + 0.05 * 3) / 10)
     assert zeros.yaw_rate_zero(stopped(), vehicle, yaw) == 0.0
 
 

@@ -84,7 +84,9 @@ def relative_gains(
     if fit is None or fit.blocks < _MIN_BLOCKS:
         return [few, common]
     disagreement = _disagreement(rows)
-    own = disagreement**2 * fit.covariance
+    # Soils that follow each other are errors that last, which the fit holds already.
+    disagreement = max(1.0, disagreement / fit.lasting) if disagreement > 1 else 0.0
+    own = max(1.0, disagreement) ** 2 * fit.covariance
     covariance = own + _considered_loads(fit, table, vehicle, driven, errors)
     rests_on = evidence(
         table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count
@@ -113,8 +115,10 @@ def _quantities(
         f"slip on one soil compared, {fit.windows} windows on {fit.blocks} stretches of track; it assumes that "
         "the soil under rear wheels is as under front ones"
     )
-    if disagreement > 1:
-        sentence += f"; the soils disagree, so the intervals are {disagreement:.1f} times wider"
+    if disagreement:
+        sentence += (
+            f"; the soils disagree, and the intervals are {disagreement * fit.lasting:.1f} times wider"
+        )
     return [
         Quantity(
             "drive_torque_gain",

@@ -118,8 +118,9 @@ def calibrate(
     else:
         unknown += gains
     if isinstance(rolling, Rolling):
-        apart = gains if isinstance(gains, RelativeGains) and shared else None
-        quantities += _useful(plausible(_radii(rolling, apart, vehicle), vehicle, unknown), vehicle, unknown)
+        apart = gains if isinstance(gains, RelativeGains) else None
+        found = _radii(rolling, apart, vehicle, determined=bool(shared))
+        quantities += _useful(plausible(found, vehicle, unknown), vehicle, unknown)
     quantities += shared
     try:
         quantities.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
@@ -264,15 +265,23 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
     return []
 
 
-def _radii(rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle) -> list[Quantity]:
-    """The radii of all wheels: the common part from the passes, the differences of the wheels from ``gains``."""
+def _radii(
+    rolling: Rolling, gains: RelativeGains | None, vehicle: Vehicle, *, determined: bool = True
+) -> list[Quantity]:
+    """The radii of all wheels: the common part from the passes, the differences of the wheels from ``gains``.
+
+    Where gains and radii could not be told apart (not ``determined``), the differences that were found are no more than a measure
+    of how far the wheels may differ.
+    """
     wheels = len(vehicle.wheels)
     differences = (np.ones(wheels), np.zeros(wheels)) if gains is None else (gains.radius, gains.radius_std)
+    if gains is not None and not determined:
+        differences = (np.ones(wheels), np.hypot(gains.radius - 1, gains.radius_std))
     sentence = (
         "ground speed over wheel speed on straight steady passes at zero pull, corrected for the slip of "
         f"{100 * rolling.slip:.2f} % there"
     )
-    if gains is not None:
+    if gains is not None and determined:
         sentence += "; what a wheel differs from the others is determined by its torque over slip"
     return [
         Quantity(

@@ -32,6 +32,7 @@ _LOCAL = 0.1  # relative difference of local adhesion between wheels, for the we
 _LEAST_LOCAL = 0.01  # and at least
 _LEAST_WINDOWS = 30
 _MOST_STRETCH = 0.8
+_LASTS = 0.2  # share of the blocks over which errors may be alike
 _UNLIKELY = 0.02  # a form that is less likely is not tried
 
 
@@ -71,7 +72,8 @@ class Sharing:
 class SharedGains:
     """``log_gain`` (w,) and relative ``radius`` (w,), both with mean 0, and their ``covariance`` (2 w, 2 w).
 
-    ``windows`` and ``blocks`` of track are what they rest on; ``load_sensitivity`` (2 w, w) is ∂(ln k, e)/∂ln F.
+    ``windows`` and ``blocks`` of track are what they rest on; ``load_sensitivity`` (2 w, w) is ∂(ln k, e)/∂ln F;
+    ``lasting``: how many times larger the gains' standard errors are for errors that outlast a block.
     """
 
     log_gain: Floats
@@ -80,6 +82,7 @@ class SharedGains:
     windows: int
     blocks: int
     load_sensitivity: Floats
+    lasting: float = 1.0
 
 
 def fit_shared_gains(data: Sharing) -> SharedGains | None:
@@ -113,6 +116,7 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
     apart = np.eye(w) - 1 / w
     center = np.block([[np.eye(w), np.zeros((w, w))], [np.zeros((w, w)), apart]])
     covariance = problem.covariance(values, scale, data.block)[: 2 * w, : 2 * w]
+    alone = problem.covariance(values, scale, data.block, lasting=False)[:w, :w]
     found = SharedGains(
         log_gain=values[:w],
         radius=apart @ values[w : 2 * w],
@@ -120,6 +124,7 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
         windows=len(data.torque),
         blocks=len(np.unique(data.block)),
         load_sensitivity=center @ problem.load_sensitivity(values, scale),
+        lasting=float(np.sqrt(np.trace(covariance[:w, :w]) / np.trace(alone))),
     )
     return found, problem
 
@@ -242,12 +247,13 @@ class _Problem:
                 break
         return values
 
-    def covariance(self, values: Floats, scale: float, block: Ints) -> Floats:
+    def covariance(self, values: Floats, scale: float, block: Ints, *, lasting: bool = True) -> Floats:
         """Sandwich covariance of the unknowns over blocks (n,)."""
         fit = self.fit(values, scale)
         score = np.einsum("nwp,nw->np", fit.jacobian, fit.weight * fit.residual)
         jacobian = fit.jacobian * np.sqrt(fit.weight)[..., None]
-        return block_covariance(fit.normal, jacobian, score, block, (fit.variance * scale) ** 2 * self.prior)
+        prior = (fit.variance * scale) ** 2 * self.prior
+        return block_covariance(fit.normal, jacobian, score, block, prior, lasting=lasting)
 
     def load_sensitivity(self, values: Floats, scale: float) -> Floats:
         """∂(ln k, e)/∂ln F by one Gauss-Newton step from the optimum, (2 w, w)."""
@@ -261,12 +267,15 @@ class _Problem:
         return np.stack(columns, axis=1)
 
 
-def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Ints, prior: Floats) -> Floats:
-    """Covariance (p, p) of a least-squares fit whose errors are correlated within blocks: leave one block out (CR3).
+def block_covariance(
+    normal: Floats, jacobian: Floats, score: Floats, block: Ints, prior: Floats, *, lasting: bool = True
+) -> Floats:
+    """Covariance (p, p) of a least-squares fit whose errors are correlated in blocks and beyond: leave one block out (CR3).
 
     ``normal`` (p, p) with all priors; ``jacobian`` (n, w, p), times the root of the weights; ``score`` (n, p) weighted
     residual times Jacobian; ``block`` (n,) labels; ``prior`` (p, p) what the priors' own errors add. One step from the
     optimum stands for each refit. Unlike the plain sandwich it does not understate the variance of a fit that rests on few blocks.
+    ``lasting``: where neighbouring blocks err alike (one soil, a receiver's error of half a minute), their products count too.
     """
     labels, code = np.unique(block, return_inverse=True)
     count, size = len(labels), len(normal)
@@ -276,7 +285,22 @@ def block_covariance(normal: Floats, jacobian: Floats, score: Floats, block: Int
     np.add.at(information, code, np.einsum("nwp,nwq->npq", jacobian, jacobian))
     shifts = (_inverse(normal - information) @ scores[..., None])[..., 0]
     inverse = _inverse(normal)
-    return np.asarray(shifts.T @ shifts * (count - 1) / count + inverse @ prior @ inverse)
+    widened = shifts * _lasting(shifts) if lasting else shifts
+    return np.asarray(widened.T @ widened * (count - 1) / count + inverse @ prior @ inverse)
+
+
+def _lasting(shifts: Floats) -> Floats:
+    """Factors (p,) of at least 1 on the standard errors: what neighbours of a row of shifts (blocks, p) add, by Bartlett's weights.
+
+    Newey and West, Econometrica 55, 1987. Products of chance sign may make a variance smaller; that is not believed.
+    """
+    reach = int(np.ceil(_LASTS * len(shifts)))
+    alone = np.sum(shifts**2, axis=0)
+    together = alone + sum(
+        2 * (1 - lag / (reach + 1)) * np.sum(shifts[lag:] * shifts[:-lag], axis=0)
+        for lag in range(1, min(reach, len(shifts) - 1) + 1)
+    )
+    return np.asarray(np.sqrt(np.maximum(together / np.maximum(alone, 1e-300), 1.0)))
 
 
 def effective_blocks(normal: Floats, jacobian: Floats, block: Ints, unknown: int) -> float:

@@ -27,7 +27,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
-from terragrip.estimation.calibration.result import Evidence, Quantity
+from terragrip.estimation.calibration.result import NORMAL_95, Evidence, Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
 from terragrip.estimation.calibration.zeros import Spell, evidence
 from terragrip.physics.loads import GRAVITY
@@ -75,7 +75,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
 
     Raises
     ------
-    InputError: fewer than 20 windows of driving, or too little pull, acceleration and slope to tell K at all.
+    InputError: fewer than 20 windows of driving, or too little pull, acceleration and slope to tell K at all (its 95 % interval holds 0).
     """
     logs = [without_held(r) for r in ([recordings] if isinstance(recordings, Recording) else recordings)]
     table = windows(logs, vehicle, _window_length(logs))
@@ -111,6 +111,12 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
             "; a resistance that goes with the grade would pass for it: pull changing loads on level ground"
         )
     std = float(np.hypot(error, scale * np.hypot(considered, by_grade)))
+    if NORMAL_95 * std > abs(scale):
+        raise InputError(
+            f"the torque scale is known to {NORMAL_95 * std / abs(scale):.0%} only: an interval that holds 0 says nothing",
+            file=logs[0].source,
+            hint="pull changing loads on level ground, or give pitch or acceleration_x",
+        )
     return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
 
 

@@ -47,13 +47,14 @@ class Spell:
 
 
 def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
-    """Spells in which vehicle and wheels stand, without the first window after they stop."""
+    """Spells in which vehicle and wheels stand, without the window after they stop and the one in which they start: torque rises first."""
     rim = np.abs(windows.wheel_speed) * vehicle.wheel_radius
     standing = (np.abs(windows.ground_speed) < _STANDING) & np.all(rim < _STANDING, axis=1)
     least = int(np.ceil(_LEAST_STANDING / windows.length))
     stops = spells(standing, windows.recording, least)
     begins = np.diff(windows.recording, prepend=-1) != 0
-    return [Spell(s.first + (not begins[s.first]), s.last) for s in stops]
+    ends = np.diff(windows.recording, append=-1) != 0
+    return [Spell(s.first + (not begins[s.first]), s.last - (not ends[s.last])) for s in stops]
 
 
 def spells(wanted: Bools, recording: Ints, least: int) -> list[Spell]:
