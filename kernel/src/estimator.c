@@ -186,6 +186,19 @@ static int32_t wheels_are_silent(const tg_estimator *e, double time)
     return 1;
 }
 
+#define TG_PEAK ((tg_real)2.4674) /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
+
+/* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. */
+static void chatter_of(tg_estimator *e, const tg_drive *drive)
+{
+    const tg_settings *s = &e->settings;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const tg_hold *const h = &e->wheel[i];
+        const tg_real square = h->count > 1 ? tgi_chatter(h, s->noise[TG_WHEEL_SPEED + i]) : 0;
+        e->scene.chatter[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (s->machine.radius[i] * drive->load[i] * h->interval)) : 0;
+    }
+}
+
 static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
 {
     tg_real *o = out->value;
@@ -194,6 +207,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
         e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
         e->scene.across[i] = e->settings.wheel_ahead[i] * e->yaw_rate;
     }
+    chatter_of(e, drive);
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;

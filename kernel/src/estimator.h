@@ -46,6 +46,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real warp[8]; /* wheel: what of its adhesion beyond all trends is no load, see warp.c */
+    tg_real chatter[8]; /* wheel: variance of an adhesion that goes to and fro from sample to sample, see inputs.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
@@ -97,6 +98,7 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
 typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
+    tg_real own;                     /* mean variance of an adhesion, by the filter */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
     tg_real usual, swing, way;       /* rho_s over the way: its mean, its mean square about that, wheel radii that these stand for; 0: nothing yet */
 } tgi_roughness;
@@ -254,6 +256,7 @@ void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_r
                      int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
+tg_real tgi_chatter(const tg_hold *h, tg_real noise);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */

@@ -2,7 +2,7 @@
 #include "estimator.h"
 
 #define TG_LEAST_SAMPLES 4 /* before any can be called a spike */
-
+#define TG_CHATTER ((tg_real)2 / 3)
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
  * torque's noise would shake omega more than the wheel ever does. */
@@ -139,6 +139,15 @@ static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_r
     return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
+/* Variance of what a wheel's speed does from one sample to the next and takes back until the third, beyond its white noise; 0 below TG_CHATTER of all
+ * that it does. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than its mean. White noise, whatever
+ * its size, has one half (docs/decisions/0160). */
+tg_real tgi_chatter(const tg_hold *h, tg_real noise)
+{
+    const tg_real back = h->bends / 2 - h->level, white = tgi_square(noise);
+    return back > TG_CHATTER * h->level && back > 4 * white ? back - white : 0;
+}
+
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
@@ -149,11 +158,13 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
     q[n] = walking_forces(e, drive, dt) + drive->strayed;
+    for (int32_t i = 0; i < n; i++)
+        if (e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = tgi_chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]) * dt / e->wheel[i].interval;
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
             row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(c->inverse_inertia[i]);
-            q[i] = held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
+            q[i] += held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(c->inverse_inertia[i]);
         }
     if (e->drawbar.count > 0 || s->towing) {

@@ -6,6 +6,7 @@
 #include "estimator.h"
 
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
+#define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is what it is late for */
 #define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
 #define TG_SMALL_RESISTANCE ((tg_real)1.6e-5) /* .004 squared */
 
@@ -52,7 +53,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     const int32_t n = e->settings.machine.wheels;
     const tg_real *const mu = e->belief.x, rho = mu[n], travelled = distance / e->constants.mean_radius;
     const tg_real fresh = travelled / (k->uneven_length + travelled), gain = travelled / (k->uneven_memory + travelled);
-    tg_real change[TG_MAX_WHEELS], square = 0;
+    tg_real change[TG_MAX_WHEELS], square = 0, own = 0;
     int32_t driven = 0;
     for (int32_t i = 0; i < n; i++) {
         if (!flowing) r->adhesion[i] = mu[i];
@@ -60,11 +61,17 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         if (!e->settings.driven[i]) continue;
         change[driven++] = mu[i] - r->adhesion[i];
         square += tgi_square(mu[i]);
+        own += e->belief.P[i * (tgi_stride(n) + 1)];
     }
-    if (driven) square /= (tg_real)driven;
+    if (driven) {
+        square /= (tg_real)driven;
+        own /= (tg_real)driven;
+    }
     if (e->constants.warps) tgi_watch_warp(e, flowing, travelled, fresh, gain);
-    count_square(&r->scatter, apart(change, driven), tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION, k->uneven_most, gain);
+    const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
+    count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);
     r->square += gain * (square - r->square);
+    count_square(&r->own, own, least, k->uneven_most, gain);
     watch_hills(e, rho, travelled);
     if (!flowing) r->resistance = rho;
     r->resistance += fresh * (rho - r->resistance);
@@ -74,13 +81,13 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Relative variance of a wheel's load that the loads of the model do not hold. Of a load that is alike over TG_LOAD_LENGTH the low-pass
+/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise (docs/decisions/0159). Of a load that is alike over TG_LOAD_LENGTH the low-pass
  * leaves length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
     const tg_tuned *k = &e->settings.tuned;
     const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length;
-    return whole * tgi_relative(e, e->roughness.scatter) + tgi_square(k->least_load_spread);
+    return whole * tgi_relative(e, tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0)) + tgi_square(k->least_load_spread);
 }
 
 /* Variance of the slope that rho_s may hold where nothing tells the slope: thrust goes into hills and soft soil alike. What rho_s does

@@ -50,7 +50,7 @@ TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene,
 {
     c->rr += scene->roughness + scene->unseen_grade;
     c->vv += scene->slow_speed + scene->disputed + scene->late;
-    for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]);
+    for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]) + scene->chatter[i];
 }
 
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */

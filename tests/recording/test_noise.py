@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from terragrip.recording import Recording, sensor_noise
+from terragrip.recording import Recording, rounding_noise, sensor_noise
 from terragrip.recording.noise import white_noise
 
 
@@ -75,3 +75,19 @@ def test_a_union_of_rates_is_judged_on_what_was_measured() -> None:
     assert sensor_noise(Recording(time, {"ground_speed": values}))["ground_speed"] == pytest.approx(
         0.02, rel=0.12
     )
+
+
+def test_the_error_of_rounding_is_found_in_a_slow_channel_too() -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(0, 300, 0.01)
+    values = np.round((smooth(time) + 0.02 * rng.standard_normal(len(time))) / 0.05) * 0.05
+    values[np.arange(len(time)) % 50 != 7] = np.nan
+    assert rounding_noise(values) == pytest.approx(0.05 / np.sqrt(12))
+
+
+def test_what_is_not_rounded_and_set_points_have_no_error_of_rounding() -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(0, 60, 0.01)
+    assert rounding_noise(smooth(time) + 0.02 * rng.standard_normal(len(time))) < 1e-6
+    assert rounding_noise(np.repeat([0.0, 40.0, 80.0, 40.0], 500)) == 0
+    assert rounding_noise(np.full(100, np.nan)) == 0

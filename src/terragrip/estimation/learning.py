@@ -85,7 +85,7 @@ class SettingsLearner:
         noise = {
             name: sd
             for name, sd in estimator.noise.items()
-            if name not in given and getattr(sensors, sensor_of(name), None) is None
+            if name not in given and getattr(sensors, sensor_of(name), None) != sd
         }
         return noise, {name: period for name, period in estimator.held.items() if name not in self._held}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -59,14 +60,27 @@ def settings_in(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Properties of the sensors from a log: SDs [SI] by channel, and the update periods [s] of held channels.
 
-    Without the SDs that the vehicle file or ``sensors`` (by channel or sensor) give; ``held``: None finds the periods.
+    Without the SDs that ``sensors`` (by channel or sensor) gives; of those that the vehicle file gives, the channels that the log rounds,
+    whose error is added to them. ``held``: None finds the periods.
     """
     from terragrip.recording import held_periods
 
     periods = dict(held_periods(recording) if held is None else held)
-    logged = logged_noise(recording, vehicle, periods)
+    logged = rounded_noise(recording, vehicle) | logged_noise(recording, vehicle, periods)
     given = sensors or {}
     return {n: sd for n, sd in logged.items() if n not in given and sensor_of(n) not in given}, periods
+
+
+def rounded_noise(recording: Recording, vehicle: Vehicle) -> dict[str, float]:
+    """By channel the SD that the vehicle file gives, with what the log's rounding adds to it (docs/decisions/0159); without the rest."""
+    from terragrip.recording import rounding_noise
+
+    result = {}
+    for name, values in recording.channels.items():
+        stated = getattr(vehicle.sensors, sensor_of(name), None)
+        if stated is not None and (more := rounding_noise(values)) > 0:
+            result[name] = math.hypot(stated, more)
+    return result
 
 
 def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:
