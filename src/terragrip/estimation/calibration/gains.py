@@ -228,7 +228,7 @@ def _near_border(table: Windows) -> Bools:
 def _considered_loads(
     fit: SharedGains, table: Windows, vehicle: Vehicle, driven: Ints, errors: ChannelErrors
 ) -> Floats:
-    """Covariance (2 w, 2 w) that constant errors of the channels add by shifting load from wheel to wheel, and stated errors of loads."""
+    """Covariance (2 w, 2 w) that constant errors of the channels add by shifting load from wheel to wheel."""
     rest = {
         "drawbar": np.nan_to_num(table.drawbar),
         "push": np.nan_to_num(table.push),
@@ -239,8 +239,7 @@ def _considered_loads(
         after = _mean_loads(table, vehicle, {**rest, name: rest[name] + getattr(errors, name)})
         changes.append(after / before - 1)
     effects = [fit.load_sensitivity @ change[driven] for change in changes]
-    unlike = (vehicle.uncertainty.vertical_load or 0.0) * fit.load_sensitivity
-    return np.asarray(np.sum([np.outer(effect, effect) for effect in effects], axis=0) + unlike @ unlike.T)
+    return np.sum([np.outer(effect, effect) for effect in effects], axis=0)
 
 
 def _mean_loads(table: Windows, vehicle: Vehicle, channels: dict[str, Floats]) -> Floats:
