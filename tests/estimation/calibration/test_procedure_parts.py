@@ -11,7 +11,7 @@ import pytest
 
 from terragrip.estimation.calibration import procedure, radii
 from terragrip.estimation.calibration.gains import RelativeGains
-from terragrip.estimation.calibration.plausible import plausible, turned_unseen
+from terragrip.estimation.calibration.plausible import gains_by_axle, plausible, turned_unseen
 from terragrip.estimation.calibration.result import Calibration, Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.speeds import _scaled
 from terragrip.estimation.zero_slip import Zero
@@ -261,3 +261,27 @@ def test_noise_of_a_sensor_is_the_files_or_the_median_of_the_logs(vehicle: Vehic
     ]
     noise = procedure._sensor_noise(logs, SimpleNamespace(sensors=known))  # type: ignore[arg-type]
     assert noise == {"drive_torque": 2.5, "drawbar_force": 7.0, "acceleration": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("gains", "words"),
+    [
+        ((1.287, 1.310, 0.772, 0.768), "The torque gains go by axle, 1.69 times apart"),
+        ((1.1, 1.12, 0.9, 0.89), ""),
+        ((1.3, 0.77, 1.3, 0.77), ""),
+    ],
+    ids=["of two axles", "of sensors", "of two sides"],
+)
+def test_gains_that_go_by_axle_are_named(gains: tuple[float, ...], words: str) -> None:
+    """The first are what an exchange of the torques of a machine of 191 and 229 kg an axle left."""
+    axles = {"front": {"mass": 191, "wheels": ["fl", "fr"]}, "rear": {"mass": 229, "wheels": ["rl", "rr"]}}
+    wheel = {"radius": 0.31, "inertia": 1.6}
+    vehicle = Vehicle.from_dict(
+        {"mass": 420, "wheelbase": 1.1, "center_of_gravity_height": 0.48, "axles": axles, "wheel": wheel}
+    )
+    found = [
+        Quantity("drive_torque_gain", g, 0.02, "", (), "", w)
+        for g, w in zip(gains, vehicle.wheels, strict=True)
+    ]
+    notes = gains_by_axle(found, vehicle)
+    assert [note.startswith(words) for note in notes] == [True] * bool(words)

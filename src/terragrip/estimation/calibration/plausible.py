@@ -16,6 +16,10 @@ from terragrip.vehicle import Vehicle
 UNSTATED_GAIN = 0.1
 """Relative SD of a torque channel's gain where the vehicle states none: that of motor currents and of strain gauges on a shaft."""
 
+_ALIKE, _APART = (
+    1.12,
+    1.4,
+)  # times: gains of an axle's wheels, and of two axles whose loads differ by a fifth and are exchanged
 _CALM = 4.0  # s: slips are compared to some tenths of a per cent
 _MOST_GAIN = 1.35  # times, either way: what is further off is no gain but wheels that did not share a curve
 _MOST_RADIUS = 0.1  # relative, from the vehicle file: tread, pressure and load together
@@ -68,6 +72,22 @@ def _beyond(quantity: Quantity, vehicle: Vehicle) -> str:
                 "the speeds, the gear ratio and the file"
             )
     return ""
+
+
+def gains_by_axle(gains: Sequence[Quantity], vehicle: Vehicle) -> list[str]:
+    """A sentence where the torque gains of two axles are far apart and those of each axle's wheels alike: what an exchange leaves."""
+    found = {q.wheel: float(np.log(q.value)) for q in gains if q.key == "drive_torque_gain" and q.value > 0}
+    axles = [[found[w] for w in axle.wheels if w in found] for axle in vehicle.axles.values()]
+    axles = [own for own in axles if own]
+    if len(axles) < 2 or any(len(own) < 2 or np.ptp(own) > np.log(_ALIKE) for own in axles):
+        return []
+    means = [float(np.mean(own)) for own in axles]
+    if np.ptp(means) < np.log(_APART):
+        return []
+    return [
+        f"The torque gains go by axle, {np.exp(np.ptp(means)):.2f} times apart, and each axle's wheels have like ones: its sensors are of "
+        "another scale, or the torques of the axles are exchanged, or their masses in the vehicle file."
+    ]
 
 
 def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, known: Collection[str]) -> list[Unknown]:

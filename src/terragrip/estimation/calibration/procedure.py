@@ -15,6 +15,7 @@ from terragrip.estimation.calibration.gains import ChannelErrors, RelativeGains,
 from terragrip.estimation.calibration.plausible import (
     UNSTATED_GAIN,
     completed_by_positions,
+    gains_by_axle,
     plausible,
     turned_unseen,
 )
@@ -127,6 +128,7 @@ def calibrate(
     except InputError as error:
         unknown.append(Unknown("drive_torque_scale", error.problem))
     unknown += turned_unseen(corrected, vehicle, [q.name for q in quantities])
+    doubts += tuple(gains_by_axle(shared, vehicle))
     return Calibration(tuple(quantities), tuple(unknown), _left(quantities, vehicle), doubts)
 
 
