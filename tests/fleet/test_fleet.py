@@ -32,7 +32,7 @@ Ran = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def ran(place: Path, scheduler: str, capsys: pytest.CaptureFixture[str]) -> Ran:
+def ran(place: Path, scheduler: str, undrawn: None, capsys: pytest.CaptureFixture[str]) -> Ran:
     """Exit code, output and errors of a call that works with a scheduler which other tests have already started."""
 
     def run(*words: object) -> tuple[int, str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,10 @@ import terragrip as tg
 from small_fleet import call, environment, fleet, free_port, serve, whole
 from terragrip.cli import main
 
-pytest.importorskip("s3fs", reason="NOT TESTED: s3fs is not installed")
-pytest.importorskip("moto", reason="NOT TESTED: moto is not installed")
-
-import boto3
-from moto.server import DomainDispatcherApplication, create_backend_app
-from werkzeug.serving import make_server
+pytestmark = [
+    pytest.mark.skipif(find_spec(name) is None, reason=f"NOT TESTED: {name} is not installed")
+    for name in ("s3fs", "moto")
+]  # imported where they are used: each worker of a run reads this file, and one runs it
 
 BUCKET = "fields"
 
@@ -31,6 +30,8 @@ class Moody:
 
     def __init__(self) -> None:
         self.refused: set[str] = set()
+        from moto.server import DomainDispatcherApplication, create_backend_app
+
         self._store = DomainDispatcherApplication(create_backend_app)
 
     def __call__(self, request: dict[str, Any], begin: Callable[..., Any]) -> Any:
@@ -47,6 +48,8 @@ class Moody:
 @pytest.fixture
 def moody() -> Iterator[tuple[Moody, dict[str, str]]]:
     """The store, and what says to s3fs where it is; botocore itself does not try again."""
+    from werkzeug.serving import make_server
+
     store, port = Moody(), free_port()
     server = make_server("127.0.0.1", port, store, threaded=True)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -71,6 +74,8 @@ def test_logs_and_data_set_on_s3(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    import boto3
+
     store, said = moody
     port = free_port()
     started += serve(place, port, **said)

@@ -77,6 +77,7 @@ def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
     assert "7 runs" in html
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_library_given_is_what_is_shown(
     files: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +149,7 @@ def test_without_typst_the_page_is_written_and_one_line_says_what_to_install(
     assert {path.name for path in tmp_path.iterdir()} == {"a.html"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_one_run_without_labels_or_sensor_leaves_sections_out_with_a_sentence(tmp_path: Path) -> None:
     made_up.estimates(1, ("",)).write(tmp_path / "bare.parquet")
     assert (
@@ -193,6 +195,7 @@ def test_the_efficiency_is_that_of_the_vehicles_own_tyres(report: Path) -> None:
     assert f"ρt = {number(made_up.VEHICLE['tire_rolling_resistance'])} the tyre" in html
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_events_of_the_estimates_are_listed_without_a_ground(tmp_path: Path) -> None:
     from terragrip.estimation.engine import EVENTS
 
@@ -214,6 +217,7 @@ def test_events_of_the_estimates_are_listed_without_a_ground(tmp_path: Path) -> 
     assert "tool slides up" not in html
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_best_slip_counts_the_vehicles_own_rolling_resistance(
     files: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -51,6 +51,7 @@ def test_slip_over_time_by_way_and_by_place(tmp_path: Path) -> None:
     assert "east [m]" in render(page)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_without_positions_the_map_is_left_out_with_its_reason(tmp_path: Path) -> None:
     result = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
     assert "no position" in result["slip-map-bare"].omitted
@@ -67,6 +68,7 @@ def test_the_ground_says_what_it_needs(tmp_path: Path, capfd: pytest.CaptureFixt
     assert not (tmp_path / "ground.json").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_it_is_said_where_slip_counts_from(tmp_path: Path) -> None:
     result = by_anchor(report_of([drive(tmp_path, position=False)]).sections)
     text = result["slip-bare"].prose[0]

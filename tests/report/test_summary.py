@@ -109,6 +109,7 @@ def test_the_hour_of_a_tractor_is_parted_as_its_dataset_labels_it() -> None:
     assert not np.any(np.isin(state[found == ROAD], ["W", "T"]))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_tractor_without_torque_gets_its_story(tractor: Path) -> None:
     page = report_of([tractor])
     found = by_anchor(page)
@@ -161,6 +162,7 @@ def test_intervals_by_label_hold_the_truth_and_too_little_has_none() -> None:
     assert one.seconds == 60
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_summary_stands_on_top_and_says_what_lacks(tmp_path: Path) -> None:
     for i in range(3):
         made_up.estimates(1000 + i, ("hard",), rows=2400).write(tmp_path / f"hard-{i}.parquet")
@@ -211,6 +213,7 @@ def test_paths_stand_side_by_side_with_their_labels(tmp_path: Path) -> None:
     assert "arrow marks the start" in picture.caption
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_short_log_gives_a_report_without_intervals(tmp_path: Path) -> None:
     made_up.estimates(1000, ("",), rows=40).write(tmp_path / "a.parquet")
     page = report_of([tmp_path / "a.parquet"])
