@@ -30,7 +30,8 @@ def open_fit(page: Any, served: Served) -> None:
 
 
 def test_bins_by_slip_are_those_of_terragrip_soils_by_slip(page: Any, served: Served, folder: Path) -> None:
-    tg.simulate(Scenario.load("multi1"), 0).save(folder / "many")
+    scenario = Scenario.load("multi1").model_copy(update={"duration": 200.0})
+    tg.simulate(scenario, 0).save(folder / "many")
     recording, vehicle = tg.read(folder / "many/recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
     tg.estimate(recording, vehicle).write(folder / "many.parquet")
     page.goto(f"{served.url}/#/fit?path=many.parquet")
