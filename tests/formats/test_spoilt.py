@@ -93,6 +93,21 @@ def test_numbers_as_texts_and_durations_are_read(tmp_path: Path) -> None:
     assert "column Fahrgeschwindigkeit [km/h] holds numbers with a decimal comma as texts" in said(path)
 
 
+def test_wheels_that_contradict_their_unit_are_named(tmp_path: Path) -> None:
+    """Turns a minute that the header calls rad/s, contradicted by ground speed and gyroscope: they were left out without a word."""
+    content = table()
+    turn = 0.3 * np.sin(content["Zeit"] / 4)
+    for name, side in zip(NAMES[2:6], (-1, 1, -1, 1), strict=True):
+        content[name] += side * turn * 0.95 / 2 / 0.3 * 30 / np.pi
+    content.columns = [name.replace("1/min", "rad/s") for name in NAMES]
+    content.assign(**{"Gierrate [rad/s]": turn}).to_csv(tmp_path / "a.csv", index=False)
+    seen = inspect(tmp_path / "a.csv", vehicle=german())
+    assert not any(name.startswith("wheel_speed_") for name in seen.proposals)
+    start = "Raddrehzahl HL in rad/s goes by the name of wheel_speed_hl, but "
+    (note,) = [one for one in seen.warnings if one.startswith(start)]
+    assert note.endswith(": check its unit.")
+
+
 def test_json_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     table().to_json(path, orient="records", lines=True)
@@ -100,17 +115,20 @@ def test_json_is_refused(tmp_path: Path) -> None:
         inspect(path)
 
 
-def test_wheels_go_by_the_vehicles_own_names(tmp_path: Path) -> None:
-    """A German vehicle file, whose radii tell the unit, too."""
+def german() -> Vehicle:
     axles = {"vorn": {"mass": 190, "wheels": ["vl", "vr"]}, "hinten": {"mass": 230, "wheels": ["hl", "hr"]}}
     wheel = {"radius": 0.3, "inertia": 1.6}
-    vehicle = Vehicle.from_dict(
+    return Vehicle.from_dict(
         {"mass": 420, "wheelbase": 1.1, "center_of_gravity_height": 0.5, "axles": axles, "wheel": wheel}
     )
+
+
+def test_wheels_go_by_the_vehicles_own_names(tmp_path: Path) -> None:
+    """A German vehicle file, whose radii tell the unit, too."""
     content = table()
     content.columns = [name.removesuffix(" [1/min]") for name in NAMES]
     content.to_csv(tmp_path / "a.csv", index=False)
-    proposals = inspect(tmp_path / "a.csv", vehicle=vehicle).proposals
-    assert {f"wheel_speed_{wheel}" for wheel in vehicle.wheels} <= proposals.keys()
+    proposals = inspect(tmp_path / "a.csv", vehicle=german()).proposals
+    assert {f"wheel_speed_{wheel}" for wheel in german().wheels} <= proposals.keys()
     assert proposals["wheel_speed_hl"].unit == "rpm"
     assert not any(name.endswith(("_fl", "_rr")) for name in proposals)

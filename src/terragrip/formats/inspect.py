@@ -16,7 +16,7 @@ from terragrip.formats.fitting import Fit, fit_of
 from terragrip.formats.profile import Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text, refusal
 from terragrip.formats.reading import read, read_log, recording_of
-from terragrip.formats.recognition import Proposal, propose, silent
+from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import days_in, notes_on, numbers_of
 from terragrip.formats.table import LogTable, Sparse
@@ -148,7 +148,7 @@ def inspect(
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
     warnings += days_in(seen.floats(), GENERAL)
-    warnings += [*quiet, *(note for note in seen.repeats.notes() if recording is None)]
+    warnings += [*proposals.left_out, *quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
     ready = recording is not None and is_ready(recording)
@@ -245,7 +245,7 @@ class Seen:
         own = None if self.stamp is None or self.clocks else self.stamp[0]
         return {n: values for n, values in self.floats().items() if n != own}
 
-    def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> dict[str, Proposal]:
+    def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> Proposals:
         """What each channel may be made of, by a vocabulary, and by the radii of a vehicle."""
         numbers = self.numbers()
         clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}

@@ -6,7 +6,7 @@ A proposal without a question mark can be defended: its unit is stated, or the d
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +60,12 @@ class Proposal:
         return (result,) if isinstance(result, str) else tuple(result) if isinstance(result, list) else ()
 
 
+class Proposals(dict[str, Proposal]):
+    """Proposals by channel; ``left_out``: sentences on speeds by name that the others contradict too clearly to be proposed."""
+
+    left_out: tuple[str, ...] = ()
+
+
 def propose(
     numbers: Mapping[str, Floats],
     texts: Texts | tuple[str, ...],
@@ -67,7 +73,7 @@ def propose(
     clocks: Mapping[str, Floats] | None = None,
     vocabulary: Vocabulary = GENERAL,
     vehicle: Vehicle | None = None,
-) -> dict[str, Proposal]:
+) -> Proposals:
     """A `Proposal` for each channel that some column may be, by channel.
 
     ``numbers`` are the columns (n,), ``texts`` the text columns, ``units`` those that the log states, ``clocks`` the instants [s] of
@@ -94,7 +100,24 @@ def propose(
     for name in texts:
         if name in LABELS or vocabulary.read(name).has("soil"):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
-    return {_in_the_vehicle(channel, vehicle): proposal for channel, proposal in proposals.items()}
+    result = Proposals({_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()})
+    result.left_out = tuple(_left_out(ranked, chosen, vehicle))
+    return result
+
+
+def _left_out(
+    ranked: Mapping[str, list[Guess]], chosen: Mapping[str, Guess], vehicle: Vehicle | None
+) -> Iterator[str]:
+    used = {guess.column.column for guess in chosen.values()}
+    for channel, guesses in ranked.items():
+        best = max(guesses, key=lambda guess: guess.confidence, default=None)
+        if best is None or channel in chosen or best.column.column in used or not best.doubt:
+            continue
+        if channel == "ground_speed" or channel.startswith("wheel_speed_"):
+            unit = f" in {best.unit}" if best.unit else ""
+            yield (
+                f"{best.column.column}{unit} goes by the name of {_in_the_vehicle(channel, vehicle)}, but {best.doubt}: check its unit."
+            )
 
 
 def _in_the_vehicle(channel: str, vehicle: Vehicle | None) -> str:
