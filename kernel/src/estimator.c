@@ -125,7 +125,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     tgi_follow(e, &e->deviations);
     watch_shocks(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
-    tgi_watch_innovation(e, row, &step);
+    tgi_watch_innovation(e, row, step.innovation[s->machine.wheels], step.innovation_variance[s->machine.wheels]);
     e->belief.supervisor = supervisor_of(e, &step);
     row->outlier |= is_outlier(e, row, &step);
     return 1;

@@ -160,6 +160,7 @@ typedef struct { /* see speeds.c; all reals, since a smoother's record is this *
     tg_real anew;                     /* 1: nothing links this row to the one before */
     tg_real yaw, standing;
     tg_real open;                     /* 1: the rims read nothing that slip could be computed from */
+    tg_real slow;                     /* variance of the ground speed's error that does not average out (slow_speed.c) */
     tg_real off;                      /* 1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither */
 } tgi_speeds;
 
@@ -294,7 +295,8 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 /* slow_speed.c */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);
 void tgi_rest_over(tg_estimator *e);
-void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *step);
+void tgi_watch_innovation(tg_estimator *e, const tg_row *row, tg_real innovation, tg_real variance);
+tg_real tgi_alike_variance(const tg_estimator *e);
 tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_slow_variance(const tg_estimator *e);

@@ -30,15 +30,14 @@ void tgi_rest_over(tg_estimator *e)
     s->count = s->mean = 0;
 }
 
-/* Take the innovation of the row's ground speed, if it was measured; beyond `spike` SDs it counts as that. A reckoned speed, or one that may be a
- * spike, is neighbour to none. */
-void tgi_watch_innovation(tg_estimator *e, const tg_row *row, const tg_step *step)
+/* Take the innovation of the row's ground speed and its variance, if it was measured (else NaN); beyond `spike` SDs it counts as that. A reckoned speed,
+ * or one that may be a spike, is neighbour to none. */
+void tgi_watch_innovation(tg_estimator *e, const tg_row *row, tg_real innovation, tg_real variance)
 {
     tgi_slow_speed *const s = &e->slow_speed;
     const tg_tuned *const k = &e->settings.tuned;
     const int32_t n = e->settings.machine.wheels;
-    const tg_real variance = step->innovation_variance[n], most = tgi_square(k->spike) * variance;
-    tg_real innovation = step->innovation[n];
+    const tg_real most = tgi_square(k->spike) * variance;
     if (isnan(innovation)) return;
     if (row->reckoned || row->doubt[n] > 0) {
         s->innovation = 0;
@@ -65,15 +64,21 @@ tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive)
     return tgi_square(e->settings.ground_speed_delay * rate_of(e, drive));
 }
 
-/* What the filter has not followed of a disagreement between its forces and the sensor, either of which may be right: the mean product of
- * neighbouring innovations, less what chance makes of it; and, while the speed changes, the age of a sample. */
-tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
+/* What the filter has not followed of a disagreement between its model and the sensor, either of which may be right: the mean product of
+ * neighbouring innovations, less what chance makes of it. */
+tg_real tgi_alike_variance(const tg_estimator *e)
 {
     const tgi_slow_speed *const s = &e->slow_speed;
+    if (!(s->alike > 0)) return 0;
+    return tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
+}
+
+/* That, and, while the speed changes, the age of a sample. */
+tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive)
+{
     const tg_real longest = e->settings.tuned.longest_walk, interval = e->ground.interval < longest ? e->ground.interval : longest;
     const tg_real aged = tgi_square(TG_SAMPLE_AGE * interval * rate_of(e, drive));
-    if (!(s->alike > 0)) return aged;
-    return aged + tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
+    return aged + tgi_alike_variance(e);
 }
 
 /* Variance of the slow error. */

@@ -136,6 +136,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     memcpy(scale, s->x, sizeof scale);
     move(scale, reach, keep);
     const tg_real side = in->y[0] > scale[0] ? 1 : -1;
+    tg_real ahead = 0, square = 0; /* innovation of the ground speed by all modes, and its mean square */
     in->confirmed = !isnan(in->y[0]) && s->off == side;
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         tgi_speed_mode *const mode = &e->speed_mode[m];
@@ -144,10 +145,14 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
         move(mode->x, reach, keep);
         carry_on(mode->P, reach, keep, size);
         disturb(tuned, scale, mode->P, dt, tuned->manoeuvre[m / TG_LEVELS], tuned->slipping[m % TG_LEVELS], n);
+        const tg_real innovation = in->y[0] - mode->x[0];
+        ahead += prior * innovation;
+        square += prior * (tgi_square(innovation) + mode->P[0][0]);
         fit[m].score = tgi_log(prior);
         update(mode, &fit[m], in, e->settings.tuning.huber, size);
         if (m == 0 || fit[m].score > best) best = fit[m].score;
     }
+    tgi_watch_innovation(e, row, ahead, square - tgi_square(ahead) + in->variance[0]);
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) sum += s->probability[m] = tgi_exp(fit[m].score - best);
     s->manoeuvre = s->slipping = 0;
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
@@ -270,6 +275,8 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     const int32_t blind = rims_are_blind(e, row, &any);
     if (any || e->standing) s->open = (tg_real)blind;
     samples_of(e, row, s, &in);
+    if (e->standing) tgi_rest_reading(e, row);
+    else tgi_rest_over(e);
     e->belief.nis = 0;
     if (s->begun != 0) step(e, dt, &in, row);
     else begin(e, &in, n);
@@ -284,6 +291,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->started = 1;
     e->time = row->time;
 
+    s->slow = tgi_slow_variance(e) + tgi_alike_variance(e);
     tgi_speeds_report(&e->settings, s, out->value);
     out->time = row->time;
     out->distance = e->distance;
@@ -292,7 +300,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
     out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     const int32_t open = is_blind(s, n);
-    e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]);
+    e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]) + s->slow;
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
     const int32_t watched = tgi_watched(e);
     out->event = (gap && !first) || open    ? TG_EVENT_GAP

@@ -30,6 +30,10 @@ _FIRST_RATE = 1.0  # SD of a [m/s²] before it was seen
 _SLOWEST = 0.1  # m/s: slower wheels change their slip speed no less
 TOGETHER = 0.9
 """Correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load."""
+SLOW_SHARE = 0.2
+"""Of the ground speed's noise: SD of an error that does not average out, before any stop has shown it."""
+MEMORY, SURE, SPIKE = 1000, 2.0, 4.0
+"""Neighbouring innovations: over so many their mean product is taken, what of it exceeds so many SDs of chance counts; cut at so many SDs."""
 
 
 @dataclass
@@ -49,6 +53,16 @@ class SpeedsFilter:
     densities: tuple[float, float] = field(init=False, default=(0.0, 0.0))
     off: float = field(init=False)
     """1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither."""
+    alike: float = field(init=False, default=0.0)
+    pairs: int = field(init=False, default=0)
+    last: float = field(init=False, default=0.0)
+    expected: float = field(init=False, default=0.0)
+
+    @property
+    def slow(self) -> float:
+        """Variance of the ground speed's error that does not average out; no stop has shown it."""
+        chance = SURE * self.expected / np.sqrt(self.pairs) if self.pairs else 0.0
+        return (SLOW_SHARE * self.noise[0]) ** 2 + (max(self.alike - chance, 0.0) if self.alike > 0 else 0.0)
 
     def __post_init__(self) -> None:
         size = len(self.noise) + 1
@@ -71,11 +85,16 @@ class SpeedsFilter:
         prior = stay * self.probability + leave
         side = 1.0 if speeds[0] > scale[0] else -1.0
         confirmed = bool(usable[0]) and self.off == side
-        result = []
+        result, ahead, square = [], 0.0, 0.0
         for m, (manoeuvre, slipping) in enumerate(PAIRS):
             x, P = self._mixed(m, stay * self.probability[m] / prior[m])
             Q = process_noise(scale, dt, manoeuvre, slipping**2)
-            result.append(self._update(move @ x, move @ P @ move.T + Q, speeds, usable, confirmed))
+            x, P = move @ x, move @ P @ move.T + Q
+            ahead += prior[m] * (speeds[0] - x[0])
+            square += prior[m] * ((speeds[0] - x[0]) ** 2 + P[0, 0])
+            result.append(self._update(x, P, speeds, usable, confirmed))
+        if usable[0]:
+            self._watch(ahead, square - ahead**2 + self.noise[0] ** 2)
         score = np.log(prior) + [one[2] for one in result]
         p = np.exp(score - score.max())
         p /= p.sum()
@@ -88,6 +107,14 @@ class SpeedsFilter:
         self.channels = int(usable.sum())
         self.densities = float(p @ [q for q, _ in PAIRS]), float(p @ [c * c for _, c in PAIRS])
         self._merge()
+
+    def _watch(self, innovation: float, variance: float) -> None:
+        """Take one more innovation of the ground speed."""
+        innovation = float(np.clip(innovation, -SPIKE * np.sqrt(variance), SPIKE * np.sqrt(variance)))
+        if self.last != 0:
+            self.pairs = min(self.pairs + 1, MEMORY)
+            self.alike += (self.last * innovation - self.alike) / self.pairs
+        self.last, self.expected = innovation, variance
 
     def _mixed(self, mode: int, own: float) -> tuple[Floats, Floats]:
         """Where a mode starts from: itself by ``own``, all modes together by the rest."""
