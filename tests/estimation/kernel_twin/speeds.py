@@ -33,7 +33,7 @@ TOGETHER = 0.9
 SLOW_SHARE = 0.2
 """Of the ground speed's noise: SD of an error that does not average out, before any stop has shown it."""
 MEMORY, SURE, SPIKE = 1000, 2.0, 4.0
-"""Neighbouring innovations: over so many their mean product is taken, what of it exceeds so many SDs of chance counts; cut at so many SDs."""
+"""Neighbouring innovations: over so many their mean product; what exceeds so many SDs of chance counts; cut at so many SDs."""
 
 
 @dataclass
