@@ -12,7 +12,7 @@ import pytest
 import terragrip as tg
 from terragrip.errors import InputError
 from terragrip.formats import inspect
-from terragrip.formats.registry import format_of, formats
+from terragrip.formats.registry import format_of, formats, is_bag
 
 DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
 
@@ -91,3 +91,22 @@ def test_every_format_of_ours_has_a_name_and_a_title() -> None:
         "csv", "parquet", "blf", "asc", "trc", "candump", "frames", "mdf", "ros1", "ros2", "mcap", "matlab", "nmea", "vbo",
     }  # fmt: skip
     assert len({one.title for one in formats().values()}) == len(formats())
+
+
+@pytest.mark.parametrize(
+    ("names", "bag"),
+    [
+        (("metadata.yaml", "run_0.mcap", "notes.csv"), True),
+        (("run_0.db3",), True),
+        (("run_0.mcap", "run_1.mcap", "notes.txt"), True),
+        (("run.mcap", "other.csv"), False),
+        (("other.csv",), False),
+    ],
+)
+def test_a_day_of_logs_one_of_which_is_a_bags_file_is_no_bag(
+    tmp_path: Path, names: tuple[str, ...], bag: bool
+) -> None:
+    """`inspect` and `estimate` took the one for the whole folder, and said nothing of the others."""
+    for name in names:
+        (tmp_path / name).write_bytes(b"")
+    assert is_bag(tmp_path) is bag

@@ -36,6 +36,7 @@ _OWN = (
     "vbo",
 )  # modules, in the order in which they are asked
 _HEAD = 8192  # bytes that tell
+_BAG, _NOTES = (".db3", ".mcap"), (".txt", ".log", ".dat")  # of a bag, and what may lie beside it
 
 Databases = Sequence[str | os.PathLike[str]]
 Reader = Callable[[str, Wanted | None, Databases], "LogTable | SignalLog"]
@@ -115,9 +116,13 @@ def format_of(path: str | os.PathLike[str]) -> Format:
 
 
 def is_bag(folder: Path) -> bool:
+    """Whether a folder is a ROS 2 bag: by its metadata, or its files, where no log of another format is beside them."""
     try:
-        return any(
-            entry.suffix in (".db3", ".mcap") or entry.name == "metadata.yaml" for entry in folder.iterdir()
-        )
+        inside = [entry.name.lower() for entry in folder.iterdir() if entry.is_file()]
     except OSError as error:
         raise unreadable(folder, error) from error
+    if "metadata.yaml" in inside:
+        return True
+    parts = [name for name in inside if name.endswith(_BAG)]
+    others = tuple(suffix for suffix in suffixes() if suffix not in (*_BAG, *_NOTES))
+    return bool(parts) and not any(name.endswith(others) for name in inside)
