@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -142,7 +143,13 @@ def estimated(
     if planned is not None:
         beside_them = (*carried_channels(known.sample, estimator), *known.sample.labels)
         planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))
-    notes = (*notes_of(estimator, known.sample), *said)
+    checks = ThreadPoolExecutor(1)  # beside the kernel, which holds no lock: a sixth of a short log's time
+    found = checks.submit(notes_of, estimator, known.sample)
+    checks.shutdown(wait=False)
+
+    def notes() -> tuple[str, ...]:
+        return (*found.result(), *said)
+
     blocks = (known.without_empty(block) for block in log.blocks())
     forward = passes.of(log.from_disk)
     if options.smooth:
@@ -172,7 +179,7 @@ class _Passes:
 def _filtered(
     estimator: TractionEstimator,
     blocks: Iterator[Recording],
-    notes: Sequence[str],
+    notes: Callable[[], Sequence[str]],
     progress: Callable[[int], None],
 ) -> Iterator[Estimates]:
     """Each block run through the estimator."""

@@ -28,7 +28,7 @@ CARRIED = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load
 def run(
     estimator: TractionEstimator,
     recording: Recording,
-    notes: Sequence[str] | None = None,
+    notes: Callable[[], Sequence[str]] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Estimates:
     """All rows of the recording through the estimator as it stands; ``notes``: None: those that it gives itself.
@@ -39,8 +39,8 @@ def run(
     out = table_of(estimator.columns, len(time))
     event = np.empty(len(time), dtype=np.uint8)
     estimator.engine.run(time, columns, out, event, progress)
-    notes = notes_of(estimator, recording) if notes is None else notes
-    return finished(estimator, recording, out, event, notes, smooth=False)
+    said = notes_of(estimator, recording) if notes is None else notes()
+    return finished(estimator, recording, out, event, said, smooth=False)
 
 
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:

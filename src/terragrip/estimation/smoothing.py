@@ -51,7 +51,7 @@ class _Forward:
 def smoothed(
     estimator: TractionEstimator,
     blocks: Iterator[Recording],
-    notes: Sequence[str],
+    notes: Callable[[], Sequence[str]],
     beside: str | os.PathLike[str] | None = None,
     forward: Done = lambda rows: None,
     backward: Done = lambda rows: None,
@@ -111,7 +111,7 @@ def _smooth(
     one: _Forward,
     carry: Floats,
     following: Floats | None,
-    notes: Sequence[str],
+    notes: Callable[[], Sequence[str]],
     step: int,
 ) -> tuple[Estimates, Floats | None]:
     """The estimates of a block, and the record of its first row; ``following`` is the record behind its last."""
@@ -126,7 +126,7 @@ def _smooth(
         records = engine.record(time[part], _cut(columns, part))
         engine.smooth(records, following, carry, _cut(out, part))
         following = records[0].copy()
-    return finished(estimator, one.block, out, one.event, notes, smooth=True), following
+    return finished(estimator, one.block, out, one.event, notes(), smooth=True), following
 
 
 def _cut(columns: dict[str, Floats], part: slice) -> dict[str, Floats]:
