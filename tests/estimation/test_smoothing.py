@@ -45,7 +45,7 @@ def test_intervals_of_the_smoother_hold_the_truth():
 def smoothed_in(recording: Recording, estimator: TractionEstimator, rows: int, step: int = 8192) -> Estimates:
     """The smoothed estimates of a recording by an estimator, in blocks of so many rows, put together."""
     blocks = (recording.select(slice(k, k + rows)) for k in range(0, len(recording), rows))
-    parts = list(smoothed(estimator, blocks, (), step=step))
+    parts = list(smoothed(estimator, blocks, tuple, step=step))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0].columns}
     codes = np.concatenate([part.event_codes for part in parts])
     labels = {name: np.concatenate([part[name] for part in parts]) for name in parts[0].labels}
@@ -107,7 +107,7 @@ def test_rows_done_are_told_forwards_and_backwards():
     sizes = [40, 40, len(log) - 80]
     blocks = (log.select(slice(k, k + 40)) for k in range(0, len(log), 40))
     estimator = TractionEstimator.for_recording(log, robot())
-    parts = list(smoothed(estimator, blocks, (), forward=ahead.append, backward=back.append))
+    parts = list(smoothed(estimator, blocks, tuple, forward=ahead.append, backward=back.append))
     assert [len(part) for part in parts] == sizes
     assert ahead == np.cumsum(sizes).tolist()
     assert back == np.cumsum(sizes[::-1]).tolist()
