@@ -91,3 +91,11 @@ def test_what_is_not_rounded_and_set_points_have_no_error_of_rounding() -> None:
     assert rounding_noise(smooth(time) + 0.02 * rng.standard_normal(len(time))) < 1e-6
     assert rounding_noise(np.repeat([0.0, 40.0, 80.0, 40.0], 500)) == 0
     assert rounding_noise(np.full(100, np.nan)) == 0
+
+
+def test_a_spoiled_value_is_no_resolution() -> None:
+    """Beside 1e30 all other values are one, so that its steps alone passed for the resolution."""
+    values = np.random.default_rng(7).standard_normal(2000)
+    values[::32] = 1e30
+    assert rounding_noise(values) == 0.0
+    assert rounding_noise(np.round(values, 1)) == pytest.approx(0.1 / np.sqrt(12.0))
