@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from terragrip.formats.conversion import converted
+from terragrip.formats.derivation import derivative
 from terragrip.formats.profile import Profile
 from terragrip.formats.table import LogTable
 
@@ -58,3 +59,14 @@ def test_the_stated_deviation_is_the_errors(case: str) -> None:
     moving = np.isfinite(result) & (np.abs(result) > 0.25)
     error = (result - np.interp(when, fine, speed))[moving]
     assert 0.6 < stated / float(np.sqrt(np.mean(error**2))) < 1.4
+
+
+def test_a_spoiled_position_is_no_resolution() -> None:
+    """Beside 1e30 m all other positions are one, and their resolution would be the speed's error."""
+    time = np.arange(0.0, 30.0, 0.1)
+    position = 1.5 * time + 0.01 * np.random.default_rng(1).standard_normal(len(time))
+    usual = derivative(time, position, 1.0)[1]
+    position[100] = 1e30
+    speed, deviation = derivative(time, position, 1.0)
+    assert deviation == pytest.approx(usual, rel=0.3)
+    assert speed[50] == pytest.approx(1.5, abs=0.05)

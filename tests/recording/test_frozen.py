@@ -138,3 +138,24 @@ def test_a_channel_of_one_value_is_named(name: str, value: float, beginning: str
 def test_a_steady_drive_has_no_acceleration() -> None:
     steady = {"ground_speed": 1.2, "wheel_speed_l": 3.0, "wheel_speed_r": 3.0, "acceleration_x": 0.0}
     assert frozen_warnings(log(**steady)) == []
+
+
+def test_a_spoiled_value_is_no_step_of_a_channel() -> None:
+    """Beside 1e30 all other values are one."""
+    speed = log().channels["ground_speed"].copy()
+    speed[300] = 1e30
+    assert frozen_warnings(log(ground_speed=speed)) == []
+    speed[(TIME >= 40) & (TIME <= 60)] = 1.5
+    (note,) = frozen_warnings(log(ground_speed=speed))
+    assert note.startswith("ground_speed repeats 1.5 from 40 to 60 s")
+
+
+def test_a_spoiled_value_is_no_change_of_another_speed() -> None:
+    """The wheels go on at one speed while the ground speed repeats a value: so may a vehicle."""
+    rows = (TIME >= 20) & (TIME <= 40)
+    columns = {n: np.where(rows, v[rows][0], v) for n, v in log().channels.items() if "wheel" in n}
+    columns["ground_speed"] = np.where(rows, 1.5, log().channels["ground_speed"])
+    steady = log(**columns)
+    assert frozen_warnings(steady) == []
+    columns["wheel_speed_l"][300] = 1e30
+    assert frozen_warnings(log(**columns)) == []

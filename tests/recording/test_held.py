@@ -166,3 +166,33 @@ def test_a_value_held_at_zero_counts_once_a_period_and_any_other_once() -> None:
     at_rest = fresh_samples(time, np.zeros(40), 1.0)
     np.testing.assert_array_equal(time[at_rest] - 100.0, [0.0, 1.5, 2.5, 3.5, 4.5])
     np.testing.assert_array_equal(np.flatnonzero(fresh_samples(time, np.ones(40), 1.0)), [0])
+
+
+SPOILED = 1e30
+
+
+def spoiled(values: np.ndarray, every: int = 50) -> np.ndarray:
+    """One value in so many as a bus error leaves it: beside it all others are alike."""
+    return np.where(np.arange(len(values)) % every == 7, SPOILED, values)
+
+
+def test_a_spoiled_value_is_no_resolution() -> None:
+    values = motion(np.arange(0, 60, 0.05), 1)
+    assert quantum(spoiled(values)) == 0.0
+    assert quantum(spoiled(np.round(values, 1))) == pytest.approx(0.1)
+
+
+def test_a_held_channel_is_held_beside_spoiled_values() -> None:
+    time = np.arange(0, 60, 0.05)
+    values = held(time, 0.5, 2)
+    assert held_period(time, spoiled(values, 400)) == pytest.approx(0.5, rel=0.1)
+    frozen = np.where(time > 40, 3.14159, values)
+    assert not fresh_samples(time, spoiled(frozen, 400), 0.5)[time > 41].any()
+
+
+@pytest.mark.parametrize("every", [15, 50])
+def test_noise_beside_spoiled_values_is_that_of_the_others(every: int) -> None:
+    """A fifteenth spoils every fourth third difference; the median of all is then 1.5 times that of the others."""
+    time = np.arange(0, 60, 0.05)
+    recording = Recording(time, {"wheel_speed_l": spoiled(motion(time, 4), every)})
+    assert 0.025 < sensor_noise(recording)["wheel_speed_l"] < 0.055

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.held import known_part, quantum
+from terragrip.recording.held import known_part, quantum, usual_values
 from terragrip.recording.ranks import median, quantile
 
 if TYPE_CHECKING:
@@ -229,4 +229,4 @@ def _may_last(when: Floats, what: Floats) -> bool:
 def _changes(other: Floats, rows: Bools) -> bool:
     """Whether another speed (n,) changes much within ``rows`` (n,)."""
     size = np.abs(other[np.isfinite(other)])
-    return bool(len(size)) and _range(other[rows]) > _CHANGED * quantile(size, 0.95) > 0.0
+    return bool(len(size)) and _range(usual_values(other[rows])) > _CHANGED * quantile(size, 0.95) > 0.0

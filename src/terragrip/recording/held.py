@@ -30,6 +30,8 @@ _FEWEST_RUNS = 8
 _REGULAR_SHARE = 0.6
 _LARGE_STEP = 1.5  # quanta: halfway between a single step and a double one
 _WORTH_A_LOOK = 0.01  # share of exact repeats below which a channel counts as fresh
+_WILD = 1000.0  # times the usual size of what is not 0: from 100 on no digit of an ordinary log moves
+_ENOUGH = 1000  # values that show the usual size
 
 
 def held_periods(recording: Recording) -> dict[str, float]:
@@ -107,8 +109,9 @@ def without_held(recording: Recording, held: dict[str, float] | None = None) -> 
 def quantum(values: Floats) -> float:
     """The quantum of a channel, its resolution: all steps between neighbours (n,) are multiples of it; 0 if there is none.
 
-    Euclid's algorithm on a sample of the steps; a remainder up to 2 % of the divisor counts as none.
+    Euclid's algorithm on a sample of the steps; a remainder up to 2 % of the divisor counts as none. Spoiled values are left out.
     """
+    values = usual_values(values)
     steps = np.abs(np.diff(values))
     size = float(np.max(np.abs(values), initial=0.0))
     steps = np.unique(steps[steps > 1e-9 * size][:: max(1, len(steps) // 2000)])[:500]
@@ -123,6 +126,19 @@ def quantum(values: Floats) -> float:
             return step
         step = float(rest.min())
     return 0.0
+
+
+def usual_values(values: Floats) -> Floats:
+    """The values (n,) without spoiled ones, beside which all others are alike: `_WILD` times the usual size; the array itself if it has
+    none."""
+    few = np.abs(values[:: max(1, len(values) // _ENOUGH)])
+    few = few[few > 0.0]
+    if not len(few):
+        return values
+    most = _WILD * median(few)
+    if not len(values) or max(np.max(values), -np.min(values)) <= most:
+        return values
+    return values[np.abs(values) <= most]
 
 
 def measured_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:

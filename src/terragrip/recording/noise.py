@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.recording.held import fresh_samples, held_periods, measured_part, quantum
+from terragrip.recording.held import fresh_samples, held_periods, measured_part, quantum, usual_values
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import REFERENCE
 
@@ -20,7 +20,6 @@ _FEWEST = 20
 _ENOUGH = 20_000  # third differences: their median is then known to a per cent
 _MAD_TO_SD = 1.482602218505602  # of a normal distribution
 _ROWS, _SAMPLES = 1000, 500  # of eight parts of a channel, and of those together: they tell a resolution
-_WILD = 10.0  # times the size of nearly all values
 _RESTLESS = 0.1  # share of values unlike the one before: a channel that changes less often has set-points
 _NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
 
@@ -74,7 +73,7 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
     scale = _MAD_TO_SD * median(np.abs(third))
     floor = quantum(values) / np.sqrt(12.0)
-    return max(scale, floor, 1e-4 * quantile(np.abs(values), 0.95))
+    return max(scale, floor, 1e-4 * quantile(np.abs(usual_values(values)), 0.95))
 
 
 def rounding_noise(values: Floats) -> float:
@@ -85,8 +84,6 @@ def rounding_noise(values: Floats) -> float:
     last = max(len(values) - _ROWS, 0)
     part = np.concatenate([values[k : k + _ROWS] for k in np.unique(np.linspace(0, last, 8, dtype=int))])
     known = part[np.isfinite(part)]
-    if len(known):  # beside a spoiled value of 1e30 all others are one
-        known = known[np.abs(known) <= _WILD * quantile(np.abs(known), 0.95)]
     if np.count_nonzero(np.diff(known)) < _RESTLESS * len(known):
         return 0.0
     return quantum(known[:: max(1, len(known) // _SAMPLES)]) / float(np.sqrt(12.0))
