@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from terragrip.vehicle import Vehicle
+
+sys.path.insert(0, str(Path(__file__).parent))  # steady_drive
 
 WHEELS = ("fl", "fr", "rl", "rr")
 Columns = dict[str, np.ndarray]

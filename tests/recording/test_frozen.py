@@ -5,24 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from steady_drive import RATE, TIME, log, pulling
 from terragrip.recording import Recording
 from terragrip.recording.frozen import frozen_warnings
-
-RATE = 10
-TIME = np.arange(0, 200, 1 / RATE)
-
-
-def log(**changed: np.ndarray | float) -> Recording:
-    """A drive between 1 and 2 m/s with a stop, slip of 5 %, noise (simulated)."""
-    draws = np.random.default_rng(1000)
-    speed = (1.5 + 0.5 * np.sin(TIME / 6)) * np.clip(np.abs(TIME - 100) - 10, 0, 3) / 3
-    columns = {"time": TIME, "ground_speed": np.round(speed + 0.01 * draws.standard_normal(len(TIME)), 3)}
-    for wheel in ("l", "r"):
-        rims = speed / 0.95 / 0.4
-        columns[f"wheel_speed_{wheel}"] = np.round(rims + 0.01 * draws.standard_normal(len(TIME)), 3)
-    columns["acceleration_x"] = np.gradient(speed, TIME) + 0.1 * draws.standard_normal(len(TIME))
-    full = {name: np.broadcast_to(np.asarray(v, dtype=np.float64), TIME.shape) for name, v in changed.items()}
-    return Recording.from_frame(columns | full)
 
 
 def repeated(name: str, start: float, end: float, value: float | None = None) -> Recording:
@@ -54,17 +39,6 @@ def test_a_ground_speed_of_0_may_be_a_vehicle_that_is_stuck() -> None:
     assert frozen_warnings(repeated("ground_speed", 20.0, 40.0, 0.0)) == []
 
 
-def pulling(**changed: np.ndarray) -> Recording:
-    """The same drive with torques and a drawbar force."""
-    draws = np.random.default_rng(1001)
-    pull = 100 + 40 * np.sin(TIME / 3)
-    forces = {
-        n: pull + draws.standard_normal(len(TIME))
-        for n in ("drive_torque_l", "drive_torque_r", "drawbar_force")
-    }
-    return log(**(forces | changed))
-
-
 @pytest.mark.parametrize("name", ["drive_torque_l", "drawbar_force"])
 def test_a_torque_or_a_pull_that_is_repeated_is_named(name: str) -> None:
     values = pulling().channels[name].copy()
@@ -82,22 +56,6 @@ def test_a_torque_at_its_limit_and_an_axle_that_is_off_are_left_alone() -> None:
     assert frozen_warnings(pulling(drive_torque_l=np.where(rows, 500.0, left))) == []
     off = {"drive_torque_l": np.where(rows, 0.0, left), "drive_torque_r": np.where(rows, 0.0, right)}
     assert frozen_warnings(pulling(**off)) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "what"),
-    [("drive_torque_l", "while all other torques are not"), ("wheel_speed_l", "while the vehicle drives")],
-)
-def test_a_channel_that_alone_drops_to_0_is_named(name: str, what: str) -> None:
-    values = np.where((TIME >= 20) & (TIME <= 30), 0.0, pulling().channels[name])
-    (note,) = frozen_warnings(pulling(**{name: values}))
-    assert note.startswith(f"{name} is 0 from 20 to 30 s {what}")
-    assert (
-        frozen_warnings(
-            pulling(**{name: np.where((TIME >= 20) & (TIME <= 24), 0.0, pulling().channels[name])})
-        )
-        == []
-    )
 
 
 def test_a_logger_that_hung_is_named_and_a_gap_is_no_repetition() -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
+from terragrip.recording.dropouts import dropout_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
@@ -64,7 +65,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     """
     recording, codes = without_codes(recording, vehicle)
     track, angles, times = track_of(recording), _angle_warnings(recording), _time_warnings(recording)
-    frozen = frozen_warnings(recording)
+    frozen = [*frozen_warnings(recording), *dropout_warnings(recording)]
     whole, recording = recording, averaged(recording, _FINEST)
     known = vehicle if vehicle is not None and vehicle.knows_wheels else None
     made = [] if known is None else odometry_warnings(whole, known)
