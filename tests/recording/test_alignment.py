@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas.testing
@@ -11,8 +12,8 @@ import pytest
 from terragrip.estimation import estimate
 from terragrip.estimation.noise import DELAY
 from terragrip.recording import Recording, alignment, survey
-from terragrip.recording.alignment import _Shift, aligned, set_right
-from terragrip.recording.lag import Lag
+from terragrip.recording.alignment import _Shift, aligned
+from terragrip.recording.lag import Lag, delay_of, lag_within
 from terragrip.recording.survey import LogBlocks, survey_of
 from terragrip.simulation import families, simulate
 from terragrip.vehicle import Vehicle
@@ -132,17 +133,28 @@ def test_a_log_says_what_its_ground_speed_may_be_late_by() -> None:
     assert delay(0.3) == pytest.approx(0.3 - explained / 2, rel=0.2)
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.3])
-def test_a_whole_recording_is_set_right_as_blocks_are(seconds: float) -> None:
+@pytest.mark.parametrize(("seconds", "searches"), [(0.0, 1), (0.3, 2)])
+def test_a_lag_is_searched_once_and_again_where_it_was_set_right(
+    seconds: float, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     time = np.arange(0.0, 300.0, 0.1)
     speed = 1.2 + 0.5 * np.sin(time / 5) + 0.2 * np.sin(time * 0.9)
     columns = {"ground_speed": np.interp(time - seconds, time, speed), "wheel_speed_l": 5 * speed}
     log = Recording.from_frame({"time": time, **columns})
-    moved, delay = set_right(log)
-    (by_blocks,) = aligned([log])
-    assert (moved.notes, delay) == (by_blocks.notes, survey_of(LogBlocks.of(by_blocks)).delay)
-    np.testing.assert_array_equal(moved.channels["ground_speed"], by_blocks.channels["ground_speed"])
+    tried = []
+
+    def counted(*arguments: Any) -> Lag | None:
+        tried.append(lag_within(*arguments))
+        return tried[-1]
+
+    for module in (alignment, survey):
+        monkeypatch.setattr(module, "lag_within", counted)
+    (moved,) = aligned([log])
     assert any("set right" in note for note in moved.notes) == (seconds > 0)
+    known = survey_of(LogBlocks.of(moved, 700)).delay
+    assert len(tried) == searches
+    assert known == delay_of(tried[-1]) == survey_of(LogBlocks.of(replace(moved, delay=None))).delay
+    assert moved.with_channels(ground_speed=speed).delay is None
 
 
 def test_a_delay_that_is_stated_counts_before_what_the_log_tells() -> None:

@@ -19,7 +19,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
-from terragrip.recording.alignment import set_right
+from terragrip.recording.alignment import aligned
 
 if TYPE_CHECKING:
     import os
@@ -72,11 +72,9 @@ def estimate(
     ------
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is used with ``smooth``.
     """
-    log, delay = (
-        (recording, None) if isinstance(recording, Recording) else set_right(Recording.from_frame(recording))
-    )
+    log = recording if isinstance(recording, Recording) else next(aligned([Recording.from_frame(recording)]))
     options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
-    (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress, delay=delay)
+    (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress)
     return result
 
 
@@ -89,16 +87,14 @@ def estimated(
     planned: Callable[[int, tuple[str, ...]], None] | None = None,
     progress: Progress | None = None,
     together: int = 1,
-    delay: float | None = None,
 ) -> Iterator[Estimates]:
     """The estimates of a log in blocks, a table for each block, in the order of time; ``options``: None: the defaults of :func:`estimate`.
 
     A first pass over the log finds the noise and the held channels (`terragrip.recording.survey`), so the size of the blocks
     changes no digit. ``beside``: blocks that wait for the backward pass of ``smooth`` are written next to this folder, if the log
     has more than one block; None: the system's folder. ``planned`` is called with the rows and the columns to come, before any row is
-    estimated. ``together``: see :class:`TractionEstimator`. ``delay``: SD [s] of what the ground speed is late
-    by behind the wheels, where it is known already; None: the first pass finds it. Raises InputError as :func:`estimate` does, each when
-    its block is reached.
+    estimated. ``together``: see :class:`TractionEstimator`. Raises InputError as :func:`estimate` does, each when its block is
+    reached.
     """
     options = options or RunOptions()
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
@@ -116,7 +112,7 @@ def estimated(
         )
         return
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)
-    known = survey_of(log, passes.of(0) if log.from_disk else None, delay)
+    known = survey_of(log, passes.of(0) if log.from_disk else None)
     passes.rows = known.rows
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:

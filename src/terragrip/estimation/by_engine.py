@@ -56,7 +56,7 @@ class ByEngine:
     def _converted(self, log: Recording, before: int) -> tuple[Recording, DrivelineTorque]:
         """The rows of a log from ``before`` on as those of the machine of driven wheels, and the driveline's torque in them."""
         channels, drive = self.machine.converted(log.time, log.channels, before)
-        return replace(log.select(slice(before, None)), channels=channels), drive
+        return replace(log.select(slice(before, None)), channels=channels, delay=None), drive
 
 
 def _tail(block: Recording) -> Recording:

@@ -17,7 +17,7 @@ from terragrip.estimation.noise import DELAY, channel_noise
 from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
-from terragrip.recording.lag import lag_within
+from terragrip.recording.lag import delay_of, lag_within
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ class TractionEstimator:
         logged, periods = settings_in(recording, vehicle, sensors=sensors, held=held)
         mine = dict(sensors or {})
         if DELAY not in mine and vehicle.sensors.ground_speed_delay is None:
-            lag = lag_within(recording.time, recording.channels)
-            mine |= {DELAY: lag.delay} if lag is not None else {}
+            known = recording.delay
+            mine[DELAY] = delay_of(lag_within(recording.time, recording.channels)) if known is None else known
         if slip_reference is None and speeds_alone(recording.channels, vehicle):
             slip_reference = slip_reference_in(recording, vehicle)
         used = sample_slots(vehicle) if slip_reference is None else speeds.slots_in(slip_reference.rims)

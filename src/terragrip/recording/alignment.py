@@ -35,7 +35,7 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
     time, columns = first_speeds(ahead)
     lag = lag_within(time, columns)
     if lag is None or not lag.is_to_set_right:
-        yield from (_doubted(block, lag) for block in chain(ahead, source))
+        yield from (_as_it_is(block, lag) for block in chain(ahead, source))
         return
     shift = _Shift.by(lag, time, columns)
     tail: list[Recording] = []
@@ -48,18 +48,9 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
         tail = [b for b in (*tail, block) if b.time[-1] > block.time[-1] - shift.reach]
 
 
-def set_right(recording: Recording) -> tuple[Recording, float]:
-    """A whole recording as `aligned` yields it, and the SD [s] of what its ground speed is late by then, as `survey_of` finds it."""
-    time, columns = first_speeds([recording])
-    lag = lag_within(time, columns)
-    if lag is None or not lag.is_to_set_right:
-        return _doubted(recording, lag), delay_of(lag)
-    moved = _Shift.by(lag, time, columns).moved(recording, [recording])
-    return moved, delay_of(lag_within(*first_speeds([moved])))
-
-
-def _doubted(block: Recording, lag: Lag | None) -> Recording:
-    """A block with a note on a lag that is too uncertain to set right."""
+def _as_it_is(block: Recording, lag: Lag | None) -> Recording:
+    """A block of a log with what its lag tells, and a note where that is too uncertain to set right."""
+    block = replace(block, delay=delay_of(lag))
     return block.with_notes(_doubt(lag)) if lag is not None and lag.is_of_the_clock else block
 
 

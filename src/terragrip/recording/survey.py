@@ -67,11 +67,10 @@ class Survey:
         return replace(block, channels={n: v for n, v in block.channels.items() if n not in self.empty})
 
 
-def survey_of(log: LogBlocks, progress: Progress | None = None, delay: float | None = None) -> Survey:
+def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
     """Read a log once; its sample is that of `sampled_rows`, whatever the blocks.
 
-    ``progress`` is called with the rows done; ``delay``: where it is known already. Raises InputError as reading the
-    blocks does, and where there is no row.
+    ``progress`` is called with the rows done. Raises InputError as reading the blocks does, and where there is no row.
     """
     kept: dict[int, list[Recording]] = {}
     holding: set[str] = set()
@@ -89,7 +88,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None, delay: float | N
             if len(kept) > CHUNKS:
                 every *= 2
                 kept = {k: parts for k, parts in kept.items() if k % every == 0}
-        if rows < ROWS:
+        if rows < ROWS and last.delay is None:
             beginning.append(_speeds_of(last))
         rows = end
         if progress is not None:
@@ -102,9 +101,10 @@ def survey_of(log: LogBlocks, progress: Progress | None = None, delay: float | N
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} holds no value and is left out." for name in empty]
-    if delay is None:
-        delay = delay_of(lag_within(*first_speeds(beginning)))
-    result = Survey(rows, sample, empty, delay)
+    delay = last.delay
+    result = Survey(
+        rows, sample, empty, delay_of(lag_within(*first_speeds(beginning))) if delay is None else delay
+    )
     return replace(result, sample=result.without_empty(sample).with_notes(*notes))
 
 

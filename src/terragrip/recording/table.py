@@ -39,7 +39,8 @@ class Recording:
     ``time`` (n,) [s] increases; ``channels`` are float64 (n,) by name, NaN = not measured at that
     instant; ``labels`` are text (n,), empty = unlabelled; ``notes`` are plain sentences for the user;
     ``noise`` is the standard deviation of a channel where the reader knows it (a derived one); ``start`` is the clock time of time 0
-    [s since 1970], None where the log has none; ``profiles`` are those that the log was read with, as in their files.
+    [s since 1970], None where the log has none; ``profiles`` are those that the log was read with, as in their files; ``delay`` is the SD
+    [s] of what the log's ground speed is late by behind its wheels, None where nobody has looked (`lag.delay_of`).
     Arrays may be read-only.
     """
 
@@ -52,6 +53,7 @@ class Recording:
     noise: dict[str, float] = field(default_factory=dict)
     start: float | None = None
     profiles: tuple[Mapping[str, Any], ...] = ()
+    delay: float | None = None
 
     @classmethod
     def from_frame(
@@ -154,7 +156,7 @@ class Recording:
     def with_channels(self, **channels: npt.ArrayLike) -> Self:
         """The same recording with channels (n,) added or replaced; raises InputError on another length."""
         added = {name: numbers(name, np.asarray(c), self.time, self.source) for name, c in channels.items()}
-        return replace(self, channels={**self.channels, **added})
+        return replace(self, channels={**self.channels, **added}, delay=None)
 
     def with_notes(self, *notes: str) -> Self:
         """The same recording with notes added, each once."""
