@@ -129,6 +129,16 @@ def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> 
     )
 
 
+def test_a_machine_that_was_carried_away_while_the_logger_was_off_is_no_clock_in_another_unit() -> None:
+    """Nor is one whose receiver gave no speed between two rests."""
+    columns = drive()
+    later = columns["time"] >= 150
+    away = columns | {"time": columns["time"] + 3600.0 * later, "latitude": columns["latitude"] + 0.2 * later}
+    assert told(away) == []
+    blind = np.where((columns["time"] > 2) & (columns["time"] < 298), np.nan, columns["ground_speed"])
+    assert not any("time may not be" in note for note in told(columns | {"ground_speed": blind}))
+
+
 def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed() -> None:
     columns = drive()
     notes = told(columns | {"time": np.arange(len(columns["time"]), dtype=float)})

@@ -52,6 +52,17 @@ def test_one_wheel_alone_is_named(columns: Columns, vehicle: Vehicle) -> None:
     assert "wheel speed of rl times" in notes[0]
 
 
+@pytest.mark.parametrize(("spins", "said"), [(False, True), (True, False)])
+def test_axles_of_unlike_rims_keep_one_ratio_where_radii_are_exchanged(
+    columns: Columns, vehicle: Vehicle, spins: bool, said: bool
+) -> None:
+    """A rear axle that spins at times is no error."""
+    more = 1.3 + (0.5 * np.sin(columns["time"] / 5) if spins else 0.0)
+    rear = {n: v * more if n.startswith("wheel_speed_r") else v for n, v in columns.items()}
+    notes = unit_warnings(Recording.from_frame(rear), vehicle)
+    assert any("The rims of the axle rear go" in note for note in notes) is said
+
+
 @pytest.mark.parametrize("slip", [-0.2, 0.0, 0.1, 0.3, 0.5])
 def test_slip_is_no_wrong_unit(columns: Columns, vehicle: Vehicle, slip: float) -> None:
     assert unit_warnings(scaled(columns, "wheel_speed", 0.93 / (1 - slip)), vehicle) == []

@@ -11,10 +11,9 @@ from terragrip.recording.plausibility import (
     _pairs,
     _ratio,
     _straight_ahead,
-    _turn_scale,
-    _wheel_turn,
 )
 from terragrip.recording.track import Track
+from terragrip.recording.turn_rates import _turn_scale, _wheel_turn
 from terragrip.recording.turns import agreement, straight_rows, windows
 from terragrip.vehicle import Vehicle
 

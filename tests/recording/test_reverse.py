@@ -55,6 +55,19 @@ def test_signed_speeds_say_nothing(backward: bool, on_the_spot: bool) -> None:
     assert said(drive(backward=backward, on_the_spot=on_the_spot)) == ""
 
 
+def test_a_single_turn_among_noise_has_one_sign() -> None:
+    """Beside most of a drive without turns the noise of two rates is large, and goes either way."""
+    columns = drive(backward=False)
+    draws, once = np.random.default_rng(3), (TIME > 200) & (TIME < 208)
+    turn = 0.5 * once
+    columns["angular_velocity_z"] = turn + 0.02 * draws.standard_normal(len(TIME))
+    for wheel in ("fl", "fr", "rl", "rr"):
+        hub = 1.0 + (-1 if wheel.endswith("l") else 1) * TRACK / 2 * turn
+        columns[f"wheel_speed_{wheel}"] = (hub + 0.05 * draws.standard_normal(len(TIME))) / 0.95 / RADIUS
+    columns["ground_speed"] = 1.0 + 0.01 * draws.standard_normal(len(TIME))
+    assert said(columns) == ""
+
+
 def test_a_ground_speed_without_a_sign_is_named() -> None:
     """A receiver's speed: the left wheel's slip was .21 and the right one's -.18 in turns backward, surely, for .01."""
     assert "ground_speed has no sign" in said(unsigned(drive(), "ground_speed"))

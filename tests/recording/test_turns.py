@@ -42,6 +42,22 @@ def test_a_right_log_is_left_alone(number: int) -> None:
     assert told(result, without="angular_velocity") == []
 
 
+@pytest.mark.parametrize(
+    ("kind", "seed", "rate"),
+    [
+        (families.Kind("robot", "brixius", "plain", "rigid"), 23, 10.0),
+        (families.Kind("tractor", "sinkage", "plain", "rigid"), 28, None),
+        (families.Kind("robot", "sinkage", "multirate", "rolling"), 22, 100.0),
+    ],
+)
+def test_an_axle_that_slips_far_beyond_the_other_is_no_exchange_and_no_scale(
+    kind: families.Kind, seed: int, rate: float | None
+) -> None:
+    """Straight ahead, and the last one stuck: its free wheels stand, and what they read is noise."""
+    result = families.draw(kind, seed, rate=rate)
+    assert unit_warnings(result.recording, result.vehicle) == []
+
+
 @pytest.mark.parametrize("pair", [("1l", "1r"), ("1l", "2r"), ("2l", "1r"), ("2l", "2r")])
 @pytest.mark.parametrize("quantities", [("wheel_speed",), ("wheel_speed", "drive_torque")])
 def test_a_left_wheel_for_a_right_one_is_named_by_turns(

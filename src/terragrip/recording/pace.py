@@ -11,6 +11,7 @@ from terragrip.physics.geodesy import metres_of
 from terragrip.recording.held import measured_part
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.stretches import gaps
 from terragrip.recording.turns import filled
 
 if TYPE_CHECKING:
@@ -41,9 +42,12 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return [
             f"ground and wheels change their speed by {changes:.3g} m/s², as no ground lets them: {_CLOCK}."
         ]
-    some = np.arange(0, len(time), max(1, len(time) // _ENOUGH))
-    way = min(_way(time[some], speed[some]), _way(time[some], _mean(rims, some)))
-    spread = _spread(recording)
+    rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
+    some = rows[:: max(1, len(rows) // _ENOUGH)]
+    way = max(
+        _way(time[some], speed[some]), _way(time[some], _mean(rims, some))
+    )  # where either has gaps, the other knows
+    spread = _spread(recording, rows)
     if spread > max(_SPREAD, _OUTRUN * way):
         return [
             f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {_CLOCK}."
@@ -114,16 +118,25 @@ def _changes(time: Floats, speed: Floats, rims: list[tuple[float, Floats]]) -> f
     return most
 
 
+def _longest_stretch(time: Floats) -> Ints:
+    """The rows of the longest run of rows at ``time`` (n,) without a gap."""
+    cuts = np.r_[0, np.flatnonzero(gaps(time)) + 1, len(time)]
+    k = int(np.argmax(np.diff(cuts)))
+    return np.arange(cuts[k], cuts[k + 1])
+
+
 def _way(time: Floats, speed: Floats) -> float:
     return float(np.sum(np.abs(speed[1:] + speed[:-1]) * np.diff(time)) / 2)
 
 
-def _spread(recording: Recording) -> float:
-    """Between how far north and south, or east and west, 90 % of the positions lie [m]; 0 without positions."""
+def _spread(recording: Recording, rows: Ints) -> float:
+    """Between how far north and south, or east and west, 90 % of the positions between the first and last of ``rows`` lie [m]; 0 without
+    positions."""
     channels = recording.channels
     if "latitude" not in channels or "longitude" not in channels:
         return 0.0
-    known = np.flatnonzero(np.isfinite(channels["latitude"]) & np.isfinite(channels["longitude"]))
+    known = np.isfinite(channels["latitude"]) & np.isfinite(channels["longitude"])
+    known = rows[0] + np.flatnonzero(known[rows[0] : rows[-1] + 1])
     if len(known) < 2:
         return 0.0
     some = known[:: max(1, len(known) // _ENOUGH)]

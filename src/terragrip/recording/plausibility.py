@@ -19,7 +19,8 @@ from terragrip.recording.reverse import reverse_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
-from terragrip.recording.turns import SURE, agreement, exchange_warnings, filled, straight_rows, windows
+from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
+from terragrip.recording.turns import exchange_warnings, filled, straight_rows
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
@@ -45,15 +46,12 @@ _RATIOS = (
 _FINEST = 0.05  # s: no check looks finer
 _ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
+_ONE = 1.15  # quartiles of one ratio
 _GAP = 1.0  # s, or three samples: nothing was measured within it
 _OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
 _TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
 _TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
-_UNLIKE, _OFTEN = (
-    0.1,
-    0.1,
-)  # of the rims' pace from side to side, and of the driving: a turn, and much turning
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 
 
@@ -72,7 +70,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     clock = [] if known is None else clock_warnings(whole, known)
     if clock:  # every other check is by time
         return [*codes, *clock, *made]
-    shown = None if known is None else _shown_turn(recording, track)
+    shown = None if known is None else shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
     sided = [] if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
@@ -85,7 +83,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *_drive_warnings(recording),
         *_position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds)),
         *exchanged,
-        *_turn_warnings(recording, None if exchanged else vehicle, track),
+        *turn_rate_warnings(recording, None if exchanged else vehicle, track),
         *angles,
         *_acceleration_warnings(recording),
         *moved,
@@ -128,6 +126,8 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     }
     if not result and mean and max(mean.values()) > _APART * min(mean.values()):
         fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
+        if not _is_one_ratio(recording, vehicle, fast, slow, straight):
+            return []
         return [
             f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
             "radii, and which wheel each column is of."
@@ -137,6 +137,17 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
         for why, those in result.items()
     ]
+
+
+def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, rows: Bools) -> bool:
+    """Whether the rims of two axles keep one ratio in ``rows`` (n,), as exchanged radii make: where one spins they do not."""
+    rims = []
+    for name in (fast, slow):
+        own = [recording.channels[f"wheel_speed_{w}"] for w in vehicle.axles[name].wheels]
+        rims.append(np.mean([filled(recording.time, np.abs(values)) for values in own], axis=0))
+    moving = rows & (rims[0] > 0.3 * _high(rims[0])) & (rims[1] > 0)
+    low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
+    return high < _ONE * low
 
 
 def _drive_warnings(recording: Recording) -> list[str]:
@@ -200,115 +211,9 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> f
     north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
     chord, made = np.hypot(np.diff(north), np.diff(east)), np.diff(np.interp(edges, recording.time, way))
     moving = made > 0.3 * _high(made)
+    for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
+        moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
     return median(chord[moving] / np.maximum(made[moving], 1e-9)) if moving.any() else 0.0
-
-
-def _shown_turn(recording: Recording, track: Track | None) -> Floats | None:
-    """The rate of turn (n,) by the gyroscope, else by the positions; None where they contradict each other."""
-    yaw = recording.channels.get("angular_velocity_z")
-    placed = None if track is None else track.at("turn", recording.time)
-    if yaw is None or not np.nanmax(np.abs(yaw), initial=0.0):
-        return placed
-    if placed is None:
-        return yaw
-    return None if agreement(recording.time, yaw, placed) < -SURE else yaw
-
-
-def _turn_warnings(recording: Recording, vehicle: Vehicle | None, track: Track | None) -> list[str]:
-    """The gyroscope's rate of turn against that of the positions and that of the wheels' speeds from side to side."""
-    yaw = recording.channels.get("angular_velocity_z")
-    if yaw is None:
-        return [] if vehicle is None or track is None else _mirrored(recording, vehicle, track)
-    if vehicle is not None and _is_dead(recording, yaw, vehicle):
-        return [
-            "angular_velocity_z never changes while the wheels' speeds turn: its sensor is dead, and the slips of both sides are wrong in "
-            "turns. Leave it out of the profile."
-        ]
-    text: dict[str, float] = {}
-    if track is not None:
-        text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
-    if vehicle is not None:
-        text["the wheels' speeds"] = agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
-    scaled = _turn_scale(recording, yaw, vehicle, track)
-    if scaled:
-        return [scaled]
-    against = [who for who, value in text.items() if value < -SURE]
-    agreed = [who for who, value in text.items() if value > SURE]
-    if not against:
-        return []
-    if agreed:
-        doubt = (
-            "left and right wheels may be exchanged"
-            if "the wheels' speeds" in against
-            else "check the positions"
-        )
-        return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
-    or_else = (
-        " If you are sure of it, left and right wheels are exchanged."
-        if against == ["the wheels' speeds"]
-        else ""
-    )
-    return [
-        f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
-        f"it in the profile.{or_else}"
-    ]
-
-
-def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
-    """Whether a rate of turn (n,) is one value throughout while the rims differ from side to side in much of the driving."""
-    shown = yaw[np.isfinite(yaw)]
-    if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
-        return False
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
-    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
-    rims = [radius[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
-    if not rims:
-        return False
-    apart, pace = windows(
-        recording.time, np.array([_wheel_turn(recording, vehicle, rims=True), np.mean(rims, axis=0)])
-    )
-    moving = pace > 0.3 * _high(pace) if len(pace) else np.zeros(0, dtype=bool)
-    return bool(moving.any()) and float(np.mean(np.abs(apart[moving]) > _UNLIKE * pace[moving])) > _OFTEN
-
-
-def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]:
-    """The positions' turns against those of the wheels, where no gyroscope decides."""
-    if agreement(recording.time, _wheel_turn(recording, vehicle), track.at("turn", recording.time)) > -SURE:
-        return []
-    return [
-        "The positions turn against the wheels' speeds: latitude and longitude, or left and right wheels, may be exchanged."
-    ]
-
-
-def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, track: Track | None) -> str:
-    """Where the rate of turn exceeds the others' by the factor of degrees to radians. A skid-steered vehicle turns by as little
-    as a third of the turn by its wheels' speeds."""
-    others: dict[str, Floats] = {}
-    if vehicle is not None and vehicle.track and vehicle.knows_wheels:
-        rims = _wheel_turn(recording, vehicle, rims=True) / vehicle.track
-        others["the wheels' speeds"] = rims
-    if track is not None:
-        others["the positions"] = track.at("turn", recording.time)
-    for who, turn in others.items():
-        if abs(agreement(recording.time, yaw, turn)) < SURE:
-            continue
-        known = np.isfinite(yaw) & np.isfinite(turn)
-        ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
-        if 12 < ratio < 100:
-            return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
-    return ""
-
-
-def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
-    """Rate of turn (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` asks for rim speeds."""
-    parts = []
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True)) if rims else {}
-    for axle in vehicle.axles.values():
-        left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
-        if len(axle.wheels) > 1 and left is not None and right is not None:
-            part = filled(recording.time, right) - filled(recording.time, left)
-            parts.append(part * radius.get(axle.wheels[-1], 1.0))
-    return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)
 
 
 def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:

@@ -57,7 +57,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if yaw is None or not sides:
         return []
     turn, shown = windows(time, np.array([np.mean(sides, axis=0), yaw]))
-    turning = _large(turn) & _large(shown)
+    turning = _turns(turn) & _turns(shown)
     if np.sum(np.abs(shown)) * WINDOW < LEAST_TURN or not _go_alike(np.abs(turn), np.abs(shown)):
         return []
     against = float(np.mean((turn * shown)[turning] < 0)) if turning.sum() >= _FEWEST else 0.0
@@ -73,6 +73,12 @@ def _go_alike(a: Floats, b: Floats) -> bool:
     """Whether two sizes (n,) are of one thing: both vary, and together."""
     varied = len(a) > _FEWEST and float(min(np.ptp(a), np.ptp(b))) > 0.0
     return varied and float(np.corrcoef(a, b)[0, 1]) > _TOGETHER
+
+
+def _turns(rate: Floats) -> Bools:
+    """Which windows (n,) are turns, by the sharpest: in a drive with few of them noise is large beside most."""
+    size = np.abs(rate)
+    return size > _FAST * float(np.max(size, initial=0.0))
 
 
 def _large(values: Floats) -> Bools:

@@ -29,7 +29,7 @@ _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _PULLING = 0.1  # of an axle's load: torques that are compared
 _UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 % off, two of them 7
-_STEADY = 0.15  # quartiles of that logarithm
+_STEADY = 0.15  # quartiles of such a logarithm
 _TOGETHER = 0.95  # correlation of an axle's pulls: what they do not share is 5 % of their ratio
 _OPPOSED = 0.7  # correlation, of the other sign
 _HARD = 0.05  # of a wheel's load: sides that are driven against each other in turns
@@ -191,6 +191,10 @@ def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
         return []
     low, ratio, high = np.quantile(left / right, [0.25, 0.5, 0.75])
     if abs(np.log(max(ratio, 1e-9))) < _ROLL or low < 1 < high:
+        return []
+    if (
+        low <= 0 or np.log(high / low) > _STEADY
+    ):  # a wheel that spins, or an axle that stands: a scale is one number
         return []
     a, b = axle.wheels
     return [

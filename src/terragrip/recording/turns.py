@@ -32,6 +32,7 @@ LEAST_TURN = 1.5  # rad: with less there is no turn to compare
 _CLEAR = 0.8  # correlation from which another order of the wheels is the right one
 _SIZES = 0.4  # of the measured turn: the turn by the rims of an axle
 _WIDE = 0.05  # of the wheels' speeds: their difference from side to side must exceed noise
+_OTHER = 0.2  # of all turns: those to the rarer side
 _RADII = 4.0  # the usual track, if none is given
 _LEAST = 15  # windows straight ahead
 _STRAIGHT = 0.05  # of the speed from side to side
@@ -141,7 +142,7 @@ def _turned(
         *means, shown = windows(time, np.r_[rims, turn[None]])
     else:
         means, shown = list(windows(time, rims)), None
-    wheels = np.array(means)
+    wheels = measured = np.array(means)
     if wheels.shape[1] == 0 or (shown is None and len(axles) < 2):
         return []
     width = vehicle.track or _RADII * float(np.mean(vehicle.wheel_radius))
@@ -149,6 +150,8 @@ def _turned(
     if shown is None:  # the part in proportion to the speed is due to the radii
         common = wheels.mean(axis=0)
         wheels = wheels - np.outer(wheels @ common / max(float(common @ common), 1e-12), common)
+
+    straight = tuple(range(len(rims)))
 
     def agree(order: Order) -> float:
         """The smallest correlation of an axle's turn with the measured one."""
@@ -161,15 +164,24 @@ def _turned(
             return 0.0
         sizes = [float(np.sum(one**2)) for one in turns]
         alike = min(sizes) > _SIZES**2 * max(sizes[0], float(np.sum(against**2)))
+        if shown is None and order != straight and not _both_ways(measured[list(order)], axles):
+            return 0.0
         return min(_correlation(against, one) for one in turns) if alike else 0.0
 
-    straight = tuple(range(len(rims)))
     if agree(straight) > SURE or (shown is not None and len(axles) == 1):
         return []
     pairs = [(left, right) for left, _ in axles for _, right in axles]
     if shown is not None and all(_correlation(shown, wheels[r] - wheels[le]) < -SURE for le, r in axles):
         return []  # all of them: the turn's own sign, or whole sides
     return [pair for pair, order in _exchanges(len(rims), pairs) if agree(order) > _CLEAR]
+
+
+def _both_ways(rims: Floats, axles: Axles) -> bool:
+    """Whether the turns by the rims (k, n) of each axle go both ways: what one axle slips beyond another looks like turns one way."""
+    sides = (rims[right] - rims[left] for left, right in axles)
+    return all(
+        min(turn[turn > 0].sum(), -turn[turn < 0].sum()) > _OTHER * np.abs(turn).sum() for turn in sides
+    )
 
 
 def _uneven(

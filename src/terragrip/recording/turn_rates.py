@@ -1,0 +1,129 @@
+"""The gyroscope's rate of turn against that of positions and wheels: sentences for the user, never errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Floats
+from terragrip.recording.ranks import quantile
+from terragrip.recording.track import Track
+from terragrip.recording.turns import SURE, agreement, filled, windows
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_UNLIKE, _OFTEN = (
+    0.1,
+    0.1,
+)  # of the rims' pace from side to side, and of the driving: a turn, and much turning
+
+
+def shown_turn(recording: Recording, track: Track | None) -> Floats | None:
+    """The rate of turn (n,) by the gyroscope, else by the positions; None where they contradict each other."""
+    yaw = recording.channels.get("angular_velocity_z")
+    placed = None if track is None else track.at("turn", recording.time)
+    if yaw is None or not np.nanmax(np.abs(yaw), initial=0.0):
+        return placed
+    if placed is None:
+        return yaw
+    return None if agreement(recording.time, yaw, placed) < -SURE else yaw
+
+
+def turn_rate_warnings(recording: Recording, vehicle: Vehicle | None, track: Track | None) -> list[str]:
+    """The gyroscope's rate of turn against that of the positions and that of the wheels' speeds from side to side."""
+    yaw = recording.channels.get("angular_velocity_z")
+    if yaw is None:
+        return [] if vehicle is None or track is None else _mirrored(recording, vehicle, track)
+    if vehicle is not None and _is_dead(recording, yaw, vehicle):
+        return [
+            "angular_velocity_z never changes while the wheels' speeds turn: its sensor is dead, and the slips of both sides are wrong in "
+            "turns. Leave it out of the profile."
+        ]
+    text: dict[str, float] = {}
+    if track is not None:
+        text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
+    if vehicle is not None:
+        text["the wheels' speeds"] = agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
+    scaled = _turn_scale(recording, yaw, vehicle, track)
+    if scaled:
+        return [scaled]
+    against = [who for who, value in text.items() if value < -SURE]
+    agreed = [who for who, value in text.items() if value > SURE]
+    if not against:
+        return []
+    if agreed:
+        doubt = (
+            "left and right wheels may be exchanged"
+            if "the wheels' speeds" in against
+            else "check the positions"
+        )
+        return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
+    or_else = (
+        " If you are sure of it, left and right wheels are exchanged."
+        if against == ["the wheels' speeds"]
+        else ""
+    )
+    return [
+        f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
+        f"it in the profile.{or_else}"
+    ]
+
+
+def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
+    """Whether a rate of turn (n,) is one value throughout while the rims differ from side to side in much of the driving."""
+    shown = yaw[np.isfinite(yaw)]
+    if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
+        return False
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
+    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
+    rims = [radius[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
+    if not rims:
+        return False
+    apart, pace = windows(
+        recording.time, np.array([_wheel_turn(recording, vehicle, rims=True), np.mean(rims, axis=0)])
+    )
+    moving = pace > 0.3 * quantile(pace, 0.95) if len(pace) else np.zeros(0, dtype=bool)
+    return bool(moving.any()) and float(np.mean(np.abs(apart[moving]) > _UNLIKE * pace[moving])) > _OFTEN
+
+
+def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]:
+    """The positions' turns against those of the wheels, where no gyroscope decides."""
+    if agreement(recording.time, _wheel_turn(recording, vehicle), track.at("turn", recording.time)) > -SURE:
+        return []
+    return [
+        "The positions turn against the wheels' speeds: latitude and longitude, or left and right wheels, may be exchanged."
+    ]
+
+
+def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, track: Track | None) -> str:
+    """Where the rate of turn exceeds the others' by the factor of degrees to radians. A skid-steered vehicle turns by as little
+    as a third of the turn by its wheels' speeds."""
+    others: dict[str, Floats] = {}
+    if vehicle is not None and vehicle.track and vehicle.knows_wheels:
+        rims = _wheel_turn(recording, vehicle, rims=True) / vehicle.track
+        others["the wheels' speeds"] = rims
+    if track is not None:
+        others["the positions"] = track.at("turn", recording.time)
+    for who, turn in others.items():
+        if abs(agreement(recording.time, yaw, turn)) < SURE:
+            continue
+        known = np.isfinite(yaw) & np.isfinite(turn)
+        ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
+        if 12 < ratio < 100:
+            return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
+    return ""
+
+
+def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
+    """Rate of turn (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` asks for rim speeds."""
+    parts = []
+    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True)) if rims else {}
+    for axle in vehicle.axles.values():
+        left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
+        if len(axle.wheels) > 1 and left is not None and right is not None:
+            part = filled(recording.time, right) - filled(recording.time, left)
+            parts.append(part * radius.get(axle.wheels[-1], 1.0))
+    return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)
