@@ -113,3 +113,16 @@ def test_gaps_do_not_make_slips_tell_less() -> None:
     without, _, _ = told(slipping(plain))
     with_gaps, _, _ = told(slipping(plain, gap=0.6))
     assert np.std(with_gaps) > 0.85 * np.std(without)
+
+
+def test_wheels_that_spin_do_not_go_on_along_the_curves_tangent() -> None:
+    """A diagonal spins in a hole that the vehicle leaves at a fifth of its speed: no curve bears more by the secant of the slips before."""
+    made = slipping(drive(30.0))
+    time, channels = made.recording.time, dict(made.recording.channels)
+    slow = 1 - 0.8 * (np.clip((time - 20) / 0.5, 0, 1) - np.clip((time - 21.5) / 0.5, 0, 1))
+    still = [f"wheel_speed_{w}" for w, sign in zip(WHEELS, LAYOUT["diagonal"], strict=True) if sign < 0]
+    channels |= {name: channels[name] * slow for name in ("ground_speed", *still)}
+    estimates = estimate(replace(made.recording, channels=channels), robot())
+    mu = np.stack([estimates[f"adhesion_{w}"] for w in WHEELS])
+    usual, spins = mu[:, (time > 10) & (time < 20)].mean(), (time > 20.5) & (time < 21.5)
+    assert np.abs(np.array(LAYOUT["diagonal"]) @ mu[:, spins] / 4).max() < usual
