@@ -124,5 +124,5 @@ def test_wheels_that_spin_do_not_go_on_along_the_curves_tangent() -> None:
     channels |= {name: channels[name] * slow for name in ("ground_speed", *still)}
     estimates = estimate(replace(made.recording, channels=channels), robot())
     mu = np.stack([estimates[f"adhesion_{w}"] for w in WHEELS])
-    usual, spins = mu[:, (time > 10) & (time < 20)].mean(), (time > 20.5) & (time < 21.5)
+    usual, spins = mu[:, (time > 19) & (time < 20)].mean(), (time > 20.5) & (time < 21.5)
     assert np.abs(np.array(LAYOUT["diagonal"]) @ mu[:, spins] / 4).max() < usual
