@@ -184,7 +184,7 @@ def test_an_optional_channel_without_values_is_left_out_at_every_length(
     monkeypatch.setattr("terragrip.formats.parquet.ROWS", 150)
     result = command(folder, "log.parquet")
     assert np.array_equal(result["adhesion_rr_std"], whole["adhesion_rr_std"], equal_nan=True)
-    assert any("pitch holds no value" in note for note in result.notes)
+    assert any("pitch has no value" in note for note in result.notes)
     assert set(result.notes) == set(whole.notes)
 
 

@@ -159,7 +159,7 @@ def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) 
             line = key.start_mark.line + 1
             if here in lines and lines[here] != line:
                 raise InputError(
-                    "the key stands twice", file=file, place=f"{_dotted(here)} (line {line})",
+                    "the key occurs twice", file=file, place=f"{_dotted(here)} (line {line})",
                     hint=f"keep one; the other is on line {lines[here]}",
                 )  # fmt: skip
             lines[here] = line

@@ -120,7 +120,7 @@ class Vehicle(Part):
             twice = next((name for name in axle.wheels if names.count(name) > 1), None)
             if twice is not None:
                 raise Fault(
-                    f"the wheel {twice} stands twice",
+                    f"the wheel {twice} occurs twice",
                     "give every wheel its own name",
                     ("axles", key, "wheels"),
                 )

@@ -65,7 +65,7 @@ def test_columns_are_those_of_a_sum() -> None:
     assert estimates.wheels == ("driven",)
     single = [f"adhesion_{wheel}" for wheel in machine.vehicle.wheels]
     assert not set(single) & set(estimates.names)
-    assert any("single wheels' adhesion cannot be had" in note for note in estimates.notes)
+    assert any("the adhesion of single wheels is not determined" in note for note in estimates.notes)
     assert estimates.about["driveline"]["vehicle"]["axles"] == machine.vehicle.to_dict()["axles"]
 
 

@@ -228,7 +228,7 @@ def test_a_stamp_of_an_mcap_is_of_64_bits(estimates, tmp_path, capsys, last, is_
     late.write(tmp_path / "e.parquet")
     code = main(["convert", str(tmp_path / "e.parquet"), "-o", str(tmp_path / "x.mcap"), "-q"])
     assert code == (0 if is_one else 2)
-    assert ("cannot be a message's stamp" in capsys.readouterr().err) is not is_one
+    assert ("cannot be the stamp of a message" in capsys.readouterr().err) is not is_one
 
 
 def obeys(data: Any, schema: Any) -> None:
@@ -313,7 +313,7 @@ def test_more_rows_than_a_file_takes_are_refused_before_the_work(
     monkeypatch.setattr("terragrip.estimation.converting.write_parts", None)  # none is written
     assert main(["convert", str(tmp_path / "e.parquet"), "-o", str(tmp_path / f"x{suffix}")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "1500 rows are more than the " in line
+    assert "1500 rows are more than " in line
     assert ".parquet" in line
     assert [p.name for p in tmp_path.iterdir()] == ["e.parquet"]
 
@@ -322,7 +322,7 @@ def test_excels_own_limit():
     from terragrip.estimation.export import require_room
 
     require_room("x.xlsx", 1_048_575, ["time"])
-    with pytest.raises(InputError, match="1048576 rows are more than the 1048575"):
+    with pytest.raises(InputError, match=r"1048576 rows are more than an Excel sheet can hold \(1048575\)"):
         require_room("x.xlsx", 1_048_576, ["time"])
 
 
@@ -336,7 +336,7 @@ def test_a_missing_package_is_named_with_its_extra(estimates, tmp_path, monkeypa
 def test_what_is_no_estimates_is_not_converted(tmp_path, capsys):
     pd.DataFrame({"time": [0.0]}).to_parquet(tmp_path / "log.parquet")
     assert main(["convert", str(tmp_path / "log.parquet"), "-o", str(tmp_path / "x.csv")]) == 2
-    assert "no table of estimates" in capsys.readouterr().err
+    assert "not a table of estimates" in capsys.readouterr().err
     assert main(["convert", str(tmp_path / "log.parquet"), "-o", str(tmp_path / "x.doc")]) == 2
     assert "x.doc: --output: is not named .parquet or" in capsys.readouterr().err
 

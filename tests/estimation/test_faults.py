@@ -292,7 +292,7 @@ def test_time_must_run_forward_between_blocks():
     recording = drive(2.0).recording
     estimator = TractionEstimator.for_recording(recording, robot())
     estimator.update_block(recording)
-    with pytest.raises(InputError, match="row 1: time does not run forward"):
+    with pytest.raises(InputError, match="row 1: time does not increase"):
         estimator.update_block(recording)
 
 

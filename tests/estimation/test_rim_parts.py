@@ -243,7 +243,7 @@ def test_a_wheel_that_turns_against_the_travel_is_named(share: float, odd: bool)
     )
     words = _against_travel(log, RIMS)
     assert words == (
-        ["The wheel speed of rr is against the travel: write 'sign: -1' for it in the profile."]
+        ["The wheel speed of rr is against the direction of travel: write 'sign: -1' for it in the profile."]
         if odd
         else []
     )
@@ -262,7 +262,7 @@ def test_where_slip_counts_from_is_said_of_wheel_and_drive() -> None:
     zero = Zero(0.975, 0.0025, 12)
     assert _said(wheel, None, False) == []
     assert _said(drive, None, True)[0].endswith(
-        "slip is against the speed as the machine gives it, to about 3%."
+        "slip counts from the speed that the machine reports, to about 3%."
     )
     assert _said(wheel, zero, False) == [
         "Zero-slip radius of wheel rl in this log: 0.7800 ± 0.0020 m, " + REST + "."
@@ -272,7 +272,7 @@ def test_where_slip_counts_from_is_said_of_wheel_and_drive() -> None:
     ]
     assert "(before calibration 0.8000 m)." in _said(drive, zero, False)[0]
     assert _said(replace(drive, has_radius=False), replace(zero, doubt="why"), True) == [
-        "Zero-slip ground speed in this log: 0.9750 ± 0.0025 of the speed that the machine gives, from 12 windows of the "
+        "Zero-slip ground speed in this log: 0.9750 ± 0.0025 of the speed that the machine reports, from 12 windows of the "
         "lightest work; why."
     ]
 

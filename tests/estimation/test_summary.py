@@ -101,8 +101,8 @@ def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:
     text = tg.estimate(pd.DataFrame(columns), tg.Vehicle.from_dict(vehicle)).summary()
     assert "Medians ± half the 95 % interval, the mean over the driven wheels:" in text
     assert "\n  by wheel" in text
-    assert "the intervals hold the sensors' noise alone" in text
-    assert text.splitlines()[-1].startswith("Next: settle what the notes doubt")
+    assert "the intervals cover the sensors' noise alone" in text
+    assert text.splitlines()[-1].startswith("Next: correct the units and signs")
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_torques_with_positions_and_no_gyroscope_give_slip_against_the_hub() -> 
 
 def test_torques_without_positions_and_gyroscope_are_said_to_be_wrong_in_turns() -> None:
     bare = tg.estimate(without(turning_log(3, seconds=120.0), *POSITIONS), machine())
-    assert any("nothing says how fast the machine turned" in note for note in bare.notes)
+    assert any("no signal shows how fast the machine turned" in note for note in bare.notes)
 
 
 def test_blocks_tell_the_turn_of_the_whole_log() -> None:

@@ -42,8 +42,8 @@ def test_the_error_of_a_median_counts_half_the_windows_and_the_place() -> None:
     [
         (0.98, 0.98, np.sqrt(0.003**2 / 30 + 0.002**2 + 0.012**2 + 0.03**2), "all windows slip alike, so"),
         (0.955, 0.955, np.sqrt(0.003**2 / 30 + 0.002**2 + 0.012**2 + 0.03**2), "all windows slip alike, so"),
-        (0.9, 1.0, 0.03, "all windows slip alike and run 10% behind the supposed radius"),
-        (1.1, 1.0, 0.03, "all windows slip alike and run 10% ahead of the supposed radius"),
+        (0.9, 1.0, 0.03, "all windows slip alike and are 10% below the supposed radius"),
+        (1.1, 1.0, 0.03, "all windows slip alike and are 10% above the supposed radius"),
         (0.84, 1.0, 0.03, "ground speed is 0.84 times wheel speed even in the lightest work"),
         (1.2, 1.0, 0.03, "ground speed is 1.2 times wheel speed even in the lightest work"),
     ],

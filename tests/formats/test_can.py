@@ -248,7 +248,7 @@ def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
         assert any("milliseconds" in note for note in table.notes)
     assert np.nanmax(read_table(folder / "highRPM1.csv").columns["EngineSpeed"]) == 1259.5
     with pytest.raises(
-        InputError, match='signal GroundBasedMachineSpeed: holds no value: it was sent as "not available"'
+        InputError, match='signal GroundBasedMachineSpeed: has no value: it was sent as "not available"'
     ):
         read(folder / "idle10sec.csv", "tractor-isobus")
 

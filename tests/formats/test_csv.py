@@ -141,7 +141,7 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         (HEAD + GOOD_ROWS + ",1,5\n", "column time, row 3: time is not a finite number"),
         ("time,groundspeed,wheel_speed_l\n" + GOOD_ROWS, "column ground_speed: is missing; the nearest column is 'groundspeed'"),
         ("t;v;w\n0;1;5\n", "column time: is missing; map the log's columns in a profile"),
-        ("time,ground_speed,wheel_speed_l,ground_speed\n0,1,5,1\n", "column ground_speed: stands twice"),
+        ("time,ground_speed,wheel_speed_l,ground_speed\n0,1,5,1\n", "column ground_speed: occurs twice"),
         ("time,ground_speed [N],wheel_speed_l\n0,1,5\n", "column ground_speed: 'N' measures a force, where a speed is"),
         (b"PK\x03\x04 rest", "is a zip or an Excel workbook; save the sheet as CSV"),
         (b"\x89HDF\r\n\x1a\n", "is a damaged MATLAB file, or none"),

@@ -65,7 +65,7 @@ def test_blocks_make_up_the_whole(tmp_path: Path, log: pd.DataFrame, rows: int) 
     ("column", "row", "value", "message"),
     [
         ("time", 200, 1.99, r"column time, row 201 \(time 1.99 s\): time repeats"),
-        ("time", 200, 0.5, r"column time, row 201 \(time 0.5 s\): time runs back from 1.99 s"),
+        ("time", 200, 0.5, r"column time, row 201 \(time 0.5 s\): time goes back from 1.99 s"),
         ("time", 250, np.nan, "column time, row 251: time is not a finite number"),
         ("wheel_speed_l", 250, np.inf, r"column wheel_speed_l, row 251 \(time 2.5 s\): is infinite"),
     ],
@@ -85,7 +85,7 @@ def test_blocks_name_the_row_of_the_whole(
 def test_blocks_refuse_what_the_whole_refuses(tmp_path: Path, log: pd.DataFrame) -> None:
     for spoilt, message in (
         (log.drop(columns="ground_speed"), "column ground_speed: is missing"),
-        (log.assign(ground_speed=np.nan), "column ground_speed: holds no value"),
+        (log.assign(ground_speed=np.nan), "column ground_speed: has no value"),
         (log.assign(ground_speed="fast"), "'fast' is not a number"),
         (log.iloc[:0], "the table is empty"),
     ):

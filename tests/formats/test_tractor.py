@@ -119,7 +119,7 @@ def test_a_machine_known_by_its_bus_speed_alone_needs_no_wheel_radii(tmp_path: P
         np.testing.assert_allclose(found[name], known[name], rtol=1e-6, atol=1e-9)
     # What needs a radius is not there, rather than for a wheel of 1 m.
     assert not [name for name in found.names if name.startswith(("wheel_speed", "zero_slip_radius"))]
-    assert any("of the speed that the machine gives" in note for note in found.notes)
+    assert any("of the speed that the machine reports" in note for note in found.notes)
     error = found["slip_drive"] - relative_slip(machine, found.time)
     assert np.sqrt(np.nanmean(error**2)) < 0.009
 

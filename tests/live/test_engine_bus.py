@@ -160,7 +160,9 @@ async def test_frames_of_eec1_and_the_engine_configuration_give_the_adhesion(tmp
                 seen = service.core.rows
                 await until(lambda seen=seen: service.core.rows > seen)
     rows = [message.row.estimate for message in service.seen if message.kind == "estimate"]
-    assert any("single wheels' adhesion cannot be had" in text for text in events(service, "schema"))
+    assert any(
+        "the adhesion of single wheels is not determined" in text for text in events(service, "schema")
+    )
     assert np.isnan(rows[20].adhesion_driven)  # what 70 % are of, nobody has said yet
     force = 0.85 * (0.62 * 800 * 1600 * np.pi / 30 - 8000) / 2.0
     assert rows[-1].adhesion_driven == pytest.approx(force / (6000 * 9.80665), abs=0.05)
@@ -168,7 +170,9 @@ async def test_frames_of_eec1_and_the_engine_configuration_give_the_adhesion(tmp
 
 
 def test_a_reference_torque_that_nobody_will_tell_is_asked_for() -> None:
-    with pytest.raises(InputError, match="reference torque that neither the log nor the vehicle file gives"):
+    with pytest.raises(
+        InputError, match="reference torque, which neither the log nor the vehicle file gives"
+    ):
         Core(
             bus(),
             Settings(

@@ -83,7 +83,7 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
         (["--source", "mqtt://h/{vehicle}/s"], "no vehicle is named"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "absent.csv"], "absent.csv"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "odd.csv"], "odd.csv: line 1: has an unknown column"),
-        (["--source", "mqtt://h/{vehicle}/s", "--index", "twice.csv"], "twice.csv: row 3: a stands here twice"),
+        (["--source", "mqtt://h/{vehicle}/s", "--index", "twice.csv"], "twice.csv: row 3: a occurs here twice"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "name.csv"], "name.csv: row 2: '../x' is no name"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "empty.csv"], "empty.csv: names no vehicle"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "lost.csv"], "nowhere.yaml"),

@@ -103,7 +103,7 @@ def test_soil_that_gives_way_is_no_late_sensor() -> None:
     log = simulate("grass-04", seed=0).recording
     (block,) = aligned([log])
     np.testing.assert_array_equal(block.channels["ground_speed"], log.channels["ground_speed"])
-    assert [n for n in block.notes if "too uncertain to set right" in n]
+    assert [n for n in block.notes if "too uncertain to correct" in n]
 
 
 @pytest.mark.parametrize("every", [1, 5])
@@ -115,7 +115,7 @@ def test_a_moved_channel_keeps_the_noise_of_its_samples(every: int) -> None:
     ground[np.arange(len(time)) % every > 0] = np.nan
     log = Recording.from_frame({"time": time, "ground_speed": ground, "wheel_speed_l": 5 * speed})
     (moved,) = aligned([log])
-    assert [n for n in moved.notes if "was set right" in n]
+    assert [n for n in moved.notes if "it was shifted by" in n]
     assert moved.noise["ground_speed"] == pytest.approx(0.02, rel=0.12)
 
 
@@ -150,7 +150,7 @@ def test_a_lag_is_searched_once_and_again_where_it_was_set_right(
     for module in (alignment, survey):
         monkeypatch.setattr(module, "lag_within", counted)
     (moved,) = aligned([log])
-    assert any("set right" in note for note in moved.notes) == (seconds > 0)
+    assert any("it was shifted by" in note for note in moved.notes) == (seconds > 0)
     known = survey_of(LogBlocks.of(moved, 700)).delay
     assert len(tried) == searches
     assert known == delay_of(tried[-1]) == survey_of(LogBlocks.of(replace(moved, delay=None))).delay

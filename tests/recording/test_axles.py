@@ -38,7 +38,7 @@ def exchanged(vehicle: Vehicle) -> Vehicle:
 
 
 def said(log: Recording, vehicle: Vehicle) -> list[str]:
-    return [note for note in unit_warnings(log, vehicle) if note.startswith("At like slip the axle")]
+    return [note for note in unit_warnings(log, vehicle) if note.startswith("At equal slip the axle")]
 
 
 @pytest.mark.parametrize("case", [*UNEQUAL, *EQUAL])

@@ -111,7 +111,9 @@ def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, pla
     if not placed:
         columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
     (note,) = told(columns)
-    assert re.search(r"change their speed by .* as no ground lets them: time may not be in seconds", note)
+    assert re.search(
+        r"change their speed by .* more than any ground allows: time may not be in seconds", note
+    )
 
 
 def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> None:
@@ -142,7 +144,7 @@ def test_a_machine_that_was_carried_away_while_the_logger_was_off_is_no_clock_in
 def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed() -> None:
     columns = drive()
     notes = told(columns | {"time": np.arange(len(columns["time"]), dtype=float)})
-    assert any(note.endswith("The wheels go with it: time may not be in seconds.") for note in notes)
+    assert any(note.endswith("The wheel speeds agree with it: time may not be in seconds.") for note in notes)
     assert not any(
         "time may not be" in note for note in told(columns | {"ground_speed": 3.6 * columns["ground_speed"]})
     )
@@ -150,14 +152,14 @@ def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed
 
 @pytest.mark.parametrize(
     ("back", "hint"),
-    [(3.0, "sort the rows, or split the log there"), (150.0, "another log begins there, it seems: split it"),
-     (3600.0, "a clock that was set to winter time[?] Write times in UTC, or add 3600 s from there on")],
+    [(3.0, "sort the rows, or split the log there"), (150.0, "split the log there: another one seems to begin"),
+     (3600.0, "was the clock set to winter time[?] Write times in UTC, or add 3600 s from there on")],
 )  # fmt: skip
 def test_a_time_that_runs_back_says_what_to_do(back: float, hint: str) -> None:
     columns = drive()
     time = columns["time"] - back * (columns["time"] >= 150)
     with pytest.raises(
-        InputError, match=rf"column time, row 3001 \(time .* s\): time runs back from 149.95 s; {hint}"
+        InputError, match=rf"column time, row 3001 \(time .* s\): time goes back from 149.95 s; {hint}"
     ):
         Recording.from_frame(columns | {"time": time})
 
@@ -195,5 +197,5 @@ def test_rounded_stamps_are_told_from_a_row_that_stands_twice(stamps: np.ndarray
         Recording.from_frame(columns | {"time": stamps.astype(np.float64)})
     once = columns["time"].copy()
     once[100] = once[99]
-    with pytest.raises(InputError, match=r"row 101 .*: time repeats; keep one row an instant"):
+    with pytest.raises(InputError, match=r"row 101 .*: time repeats; keep one row per instant"):
         Recording.from_frame(columns | {"time": once})

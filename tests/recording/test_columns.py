@@ -34,7 +34,7 @@ def test_what_is_no_table_is_refused_by_its_type(table: Any) -> None:
 def test_columns_of_one_length_and_of_one_name_each() -> None:
     with pytest.raises(InputError, match=r"column b.*has 2 rows, the first column 3"):
         columns_of({"a": [1, 2, 3], "b": [1, 2]}, None)
-    with pytest.raises(InputError, match=r"column 1.*stands twice"):
+    with pytest.raises(InputError, match=r"column 1.*occurs twice"):
         columns_of({1: [1.0], "1": [2.0]}, None)
     with pytest.raises(InputError, match=r"column a.*has 2 dimensions"):
         columns_of({"a": np.zeros((2, 2))}, None)

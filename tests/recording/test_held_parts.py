@@ -179,8 +179,8 @@ def test_of_a_block_rows_and_time_count_from_the_table() -> None:
     check_time(np.array([2.0, 3.0]), None, first_row=10, after=1.0)
     for time, after, words in (
         ([1.0, 3.0], 1.0, r"row 11 \(time 1 s\): time repeats"),
-        ([0.5, 3.0], 1.0, r"row 11 \(time 0\.5 s\): time runs back from 1 s"),
-        ([2.0, 3.0, 2.5], 1.0, r"row 13 \(time 2\.5 s\): time runs back from 3 s"),
+        ([0.5, 3.0], 1.0, r"row 11 \(time 0\.5 s\): time goes back from 1 s"),
+        ([2.0, 3.0, 2.5], 1.0, r"row 13 \(time 2\.5 s\): time goes back from 3 s"),
         ([2.0, np.inf], None, "row 12: time is not a finite number"),
         ([np.nan, 3.0], None, "row 11: time is not a finite number"),
     ):
@@ -204,4 +204,4 @@ def test_what_is_missing_and_what_is_not_used_is_said() -> None:
         f"Columns that are not used: {', '.join(names)}."
     ]
     assert remarks(("drawbar_force", *names, "y", "z"))[0].endswith("x7 and 2 more.")
-    assert remarks(("time",)) == ["There is no drawbar_force: the vehicle is taken to tow nothing."]
+    assert remarks(("time",)) == ["There is no drawbar_force: the vehicle is assumed to tow nothing."]

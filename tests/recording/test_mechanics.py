@@ -141,7 +141,7 @@ def test_without_an_accelerometer_the_ground_speed_tells() -> None:
     ("axes", "expected"),
     [
         (("acceleration_x", "acceleration_y"), "the two axes may be exchanged"),
-        (("pitch", "roll"), "climbs that go with roll and not with pitch"),
+        (("pitch", "roll"), "climbs that vary with roll and not with pitch"),
     ],
 )
 def test_exchanged_axes_are_named(axes: tuple[str, str], expected: str) -> None:
@@ -180,8 +180,8 @@ def pulling(seed: int = 0) -> Columns:
             "drawbar_force is -0.2 of the weight on average: a backward pull is positive",
         ),
         ({"drawbar_force": 1e-3}, "it may be in kN"),
-        ({"drawbar_force": 3.0}, "leaves nothing that could drive the vehicle"),
-        ({"drive_torque": 1e-3}, "leaves nothing that could drive the vehicle"),
+        ({"drawbar_force": 3.0}, "leaves nothing to drive the vehicle"),
+        ({"drive_torque": 1e-3}, "leaves nothing to drive the vehicle"),
     ],
 )
 def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str) -> None:

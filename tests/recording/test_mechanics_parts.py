@@ -176,8 +176,8 @@ def torques(turned: tuple[str, ...] = (), **more: np.ndarray) -> Recording:
         (1.0, 0.5, "radius are 0.5 times the force"),
         (1.0, -1.0, "The drive torques fall where the vehicle is driven harder"),
         (-1.0, 1.0, "acceleration_x is not the change of ground speed but its opposite, and the drive torques contradict it"),
-        (0.1, 1.0, "acceleration_x is not the change of ground speed but 0.1 times what the drive torques make of 139 kg"),
-        (3.0, 1.0, "but 3 times what the drive torques make"),
+        (0.1, 1.0, "acceleration_x is not the change of ground speed but 0.1 times what the drive torques give for 139 kg"),
+        (3.0, 1.0, "but 3 times what the drive torques give"),
         (2.0, 0.5, "The drive torques over radius and mass and acceleration_x go 0.25 times apart"),
     ],
 )  # fmt: skip
@@ -223,12 +223,12 @@ def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
     log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))
     sideways = np.random.default_rng(1).normal(size=80)
     (note,) = _balance_warnings(log, means, sideways, dict.fromkeys(WHEELS, X / 4), vehicle)
-    assert note.startswith("acceleration_y goes with the drive torques")
+    assert note.startswith("acceleration_y varies with the drive torques")
 
 
 @pytest.mark.parametrize(
     ("slope", "with_roll", "words"),
-    [(1.0, False, ""), (-1.0, False, "pitch falls"), (0.0, True, "go with roll")],
+    [(1.0, False, ""), (-1.0, False, "pitch falls"), (0.0, True, "vary with roll")],
 )
 def test_pitch_is_held_against_what_the_accelerometer_reads_beyond_the_speed(
     slope: float, with_roll: bool, words: str
@@ -264,7 +264,7 @@ def test_a_channel_that_never_changes_beside_others_that_do(vehicle: Vehicle) ->
     assert notes() == []
     assert notes(*names) == []
     assert notes(names[1]) == [
-        "wheel_speed_fr (3.25) never changes while the vehicle drives: a sensor that is dead, or a wrong column."
+        "wheel_speed_fr (3.25) never changes while the vehicle drives: the sensor is dead, or the column is wrong."
     ]
     assert notes(*names[:2])[0].startswith(
         "wheel_speed_fl (3.25) and wheel_speed_fr (3.25) never change while"
@@ -306,7 +306,7 @@ def test_slip_at_hardly_a_torque_is_a_wrong_radius(
     assert bool(notes) is doubted
     if doubted:
         assert f"the wheels fl, fr, rl, rr slip by {1 - ratio:.2f}" in notes[0]
-        assert f"they roll {ratio * RADIUS:.3g} m a radian, and their radius is stated as 0.2 m" in notes[0]
+        assert f"they roll {ratio * RADIUS:.3g} m per radian, but the stated radius is 0.2 m" in notes[0]
     few = Recording(time, {n: v for n, v in channels.items() if n != "drive_torque_fl"})
     assert ("fr, rl, rr slip" in " ".join(_radius_warnings(few, vehicle, means))) is doubted
 

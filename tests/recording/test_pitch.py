@@ -47,7 +47,7 @@ def test_a_grade_in_per_cent_declared_as_degrees_is_named(case: Case) -> None:
 def test_radians_declared_as_degrees_are_named(case: Case) -> None:
     log = drive(*case)
     (note,) = said(log, np.radians(log.channels["pitch"]))
-    assert "in radians, and was taken for degrees" in note
+    assert "in radians, but was converted from degrees" in note
 
 
 @pytest.mark.parametrize("case", MACHINES[2:])

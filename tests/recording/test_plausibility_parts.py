@@ -38,7 +38,7 @@ def wheels(ratio: float) -> dict[str, np.ndarray]:
         (30 / np.pi, "wheel_speed may be in rpm"),
         (180 / np.pi, "wheel_speed may be in deg/s"),
         (1 / 3.6, "ground_speed may be in km/h"),
-        (np.pi / 30, "rpm divided twice"),
+        (np.pi / 30, "converted from rpm twice"),
         (0.5 / np.pi, "revolutions per second"),
         (np.pi / 180, "from degrees to radians twice"),
         (0.01, "ground_speed may be in cm/s"),
@@ -75,10 +75,10 @@ def test_what_may_be_slip_is_not_doubted(vehicle: Vehicle, ratio: float, doubted
     ("ratio", "words"),
     [
         (2.4, "check units"),
-        (2.6, "wheel_based_speed may be in km/h, or ground_speed was taken"),
+        (2.6, "wheel_based_speed may be in km/h, or ground_speed was converted"),
         (5.4, "wheel_based_speed may be in km/h"),
         (5.6, "check units"),
-        (1 / 2.6, "ground_speed may be in km/h, or wheel_based_speed was taken"),
+        (1 / 2.6, "ground_speed may be in km/h, or wheel_based_speed was converted"),
         (1 / 5.6, "check units"),
     ],
 )
@@ -106,12 +106,12 @@ def driven(speed: float, turn: float = 0.0) -> dict[str, np.ndarray]:
         (3.0, "is 3 times the speed of the positions: it may be in km/h"),
         (4.3, "is 4.3 times the speed of the positions: it may be in km/h"),
         (4.5, "is 4.5 times the speed of the positions: check its unit"),
-        (1 / 3.0, "is 0.333 times the speed of the positions: it was taken for km/h"),
-        (1 / 4.3, "is 0.233 times the speed of the positions: it was taken for km/h"),
+        (1 / 3.0, "is 0.333 times the speed of the positions: it was converted from km/h"),
+        (1 / 4.3, "is 0.233 times the speed of the positions: it was converted from km/h"),
         (1 / 1.1, ""),
-        (1 / 1.852, "the positions come 1.85 times as far as ground_speed makes"),
-        (1 / 2.8, "the positions come 2.8 times as far as ground_speed makes"),
-        (1 / 4.5, "the positions come 4.5 times as far as ground_speed makes"),
+        (1 / 1.852, "the positions move 1.85 times as far as ground_speed does"),
+        (1 / 2.8, "the positions move 2.8 times as far as ground_speed does"),
+        (1 / 4.5, "the positions move 4.5 times as far as ground_speed does"),
     ],
 )
 def test_ground_speed_is_held_against_positions(times: float, words: str) -> None:
@@ -125,7 +125,7 @@ def test_positions_outrun_a_slow_speed_by_half_as_much_again_in_a_straight_line(
 ) -> None:
     """In 10 s on a circle at 2 m/s they come 4/ω sin(5 ω) m, 13, 9.1 and 6.9; the ground speed makes 5.6 of it."""
     note = said(time=3 * TIME, ground_speed=np.full(N, 2.0 / 3.6), **driven(2.0, turn=turn))
-    assert ("taken for km/h" in note) is outrun
+    assert ("converted from km/h" in note) is outrun
 
 
 def test_the_straight_way_is_told_against_the_one_driven() -> None:

@@ -34,7 +34,7 @@ DERIVED = {
         "wheel_speed_l": {"from": "w", "unit": "rad/s"},
     },
 }
-NOTE = "rows repeat the time of the row before without another value: put together with it."
+NOTE = "rows repeat the time of the row before without another value: merged with it."
 
 
 def log(rows: int = 400) -> pd.DataFrame:
@@ -83,7 +83,7 @@ def test_another_value_at_the_same_time_is_refused(column: str, value: object) -
     frame = doubled(log(), [100])
     frame.loc[101, column] = value
     with pytest.raises(
-        InputError, match=r"column time, row 102 \(time 2 s\): time repeats; keep one row an instant"
+        InputError, match=r"column time, row 102 \(time 2 s\): time repeats; keep one row per instant"
     ):
         PLAIN.apply(frame)
 

@@ -76,5 +76,5 @@ def test_a_ground_speed_without_a_sign_is_named() -> None:
 
 def test_speeds_without_a_sign_are_named_by_the_gyroscope() -> None:
     both = unsigned(unsigned(drive(), "ground_speed"), "wheel_speed")
-    assert "goes against the wheels' speeds: where these have no sign" in said(both)
+    assert "contradicts the wheels' speeds: if these have no sign" in said(both)
     assert said({name: v for name, v in both.items() if name != "angular_velocity_z"}) == ""

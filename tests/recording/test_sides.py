@@ -109,7 +109,7 @@ def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool
 
 
 def test_a_wheel_that_turns_against_all_others_is_named() -> None:
-    (note,) = [n for n in told(skidding(), wheel_speed_rr=-1.0) if "against that of all others" in n]
+    (note,) = [n for n in told(skidding(), wheel_speed_rr=-1.0) if "opposite to that of all others" in n]
     assert note.startswith("The wheel speed of rr is")
 
 

@@ -31,7 +31,7 @@ def test_a_sample_is_the_same_chunks_however_the_log_is_cut(rows: int, block: in
     np.testing.assert_array_equal(known.sample["soil"], expected["soil"])
     assert (known.rows, known.empty) == (rows, ("pitch",))
     assert set(known.sample.channels) == {"ground_speed", "roll"}
-    assert known.sample.notes == ("pitch holds no value and is left out.",)
+    assert known.sample.notes == ("pitch has no value and is left out.",)
     assert done == [min(k + block, rows) for k in range(0, rows, block)]
 
 

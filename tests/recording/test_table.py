@@ -75,7 +75,7 @@ def test_notes_name_what_is_not_used_and_what_is_not_towed(columns: Columns) -> 
     notes = " ".join(Recording.from_frame(frame).notes)
     assert "not used: drive_torqe_fl" in notes
     assert "tow nothing" in notes
-    assert "pitch holds no value and is left out" in notes
+    assert "pitch has no value and is left out" in notes
 
 
 def test_references_pass_through(columns: Columns) -> None:
@@ -126,7 +126,7 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         (_without("time"), "column time: is missing; map"),
         (lambda c: {k: v for k, v in c.items() if "wheel" not in k}, "column wheel_speed_<wheel>: is missing; map"),
         (_as_object("ground_speed", 16, "fast"), "column ground_speed, row 17 (time 0.16 s): 'fast' is not a number"),
-        (lambda c: {**c, "time": c["time"][::-1]}, "column time, row 2 (time 59.98 s): time runs back from 59.99 s"),
+        (lambda c: {**c, "time": c["time"][::-1]}, "column time, row 2 (time 59.98 s): time goes back from 59.99 s"),
         (lambda c: spoilt(c, "time", 16, 0.15), "column time, row 17 (time 0.15 s): time repeats"),
         (lambda c: spoilt(c, "time", 16, np.nan), "column time, row 17: time is not a finite number"),
         (lambda c: spoilt(c, "time", 5999, np.inf), "column time, row 6000: time is not a finite number"),
@@ -136,15 +136,15 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         ),
         (lambda c: {**c, "time": 1.7e15 + 1e6 * c["time"]}, "column time: is 1.7e+15 s, past the year 5000: since 1970 in us?"),
         (lambda c: spoilt(c, "drawbar_force", 16, -np.inf), "column drawbar_force, row 17 (time 0.16 s): is infinite"),
-        (lambda c: {**c, "ground_speed": np.full(6000, np.nan)}, "column ground_speed: holds no value"),
-        (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: holds no value"),
+        (lambda c: {**c, "ground_speed": np.full(6000, np.nan)}, "column ground_speed: has no value"),
+        (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: has no value"),
         (lambda c: {k: v[:0] for k, v in c.items()}, "the table is empty"),
         (lambda c: {}, "there are no columns"),
         (lambda c: {**c, "pitch": np.zeros(3)}, "column pitch: has 3 rows, the first column 6000"),
         (lambda c: {**c, "pitch": np.zeros((6000, 2))}, "column pitch: has 2 dimensions"),
         (lambda c: {**c, "pitch": c["time"] + 1j}, "column pitch: holds complex128, not numbers"),
         (lambda c: [1, 2], "list is not a table"),
-        (lambda c: pd.concat([pd.DataFrame(c)] * 2, axis=1), "column time: stands twice"),
+        (lambda c: pd.concat([pd.DataFrame(c)] * 2, axis=1), "column time: occurs twice"),
     ],
 )  # fmt: skip
 def test_refusal(columns: Columns, change: Callable[[Columns], Any], message: str) -> None:

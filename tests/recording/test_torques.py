@@ -96,7 +96,7 @@ def test_uncalibrated_torques_and_cells_are_no_wrong_scale() -> None:
 def test_a_thrust_that_no_ground_carries_is_a_unit(cell: bool) -> None:
     log = working(scale=100.0)
     notes = unit_warnings(log if cell else without_cell(log), vehicle())
-    assert any("times the weight on average, which no ground carries" in n for n in notes)
+    assert any("times the weight on average, which no ground can bear" in n for n in notes)
 
 
 def test_wheels_that_brake_on_average_while_nothing_pulls_have_a_sign() -> None:

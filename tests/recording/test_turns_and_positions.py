@@ -82,13 +82,13 @@ def test_right_channels_say_nothing() -> None:
         (
             "wheel_based_speed",
             1 / 3.6,
-            "ground_speed may be in km/h, or wheel_based_speed was taken for km/h",
+            "ground_speed may be in km/h, or wheel_based_speed was converted from km/h",
         ),
         ("ground_speed", 3.6, "times the speed of the positions: it may be in km/h"),
         (
             "ground_speed",
             1 / 3.6,
-            "times the speed of the positions: it was taken for km/h",
+            "times the speed of the positions: it was converted from km/h",
         ),
     ],
 )
@@ -131,7 +131,7 @@ def test_an_inverted_yaw_rate_is_noticed_everywhere(
     # Without positions the wheels alone do, and either may be wrong.
     where = ("latitude", "longitude")
     alone = Recording.from_frame({name: values for name, values in columns.items() if name not in where})
-    or_else = "If you are sure of it, left and right wheels are exchanged."
+    or_else = "If its sign is right, left and right wheels are exchanged."
     assert [or_else in note for note in unit_warnings(alone, machine()) if "wrong sign" in note] == [True]
     assert not any(or_else in note for note in unit_warnings(log, machine()))
     machine().save(tmp_path / "v.yaml")
@@ -172,7 +172,7 @@ def test_slip_alone_turns_by_the_positions(position: bool) -> None:
         assert "The rate of turn is that of the positions" in sentence
         assert np.median(error) < 0.02
     else:
-        assert "nothing says how fast the machine turned" in sentence
+        assert "no signal shows how fast the machine turned" in sentence
         assert np.median(error) > 0.1
 
 

@@ -77,7 +77,7 @@ def test_use_merges_and_extends_inherits(file):
         ("duration: 10 s\nspede: 3", r"drive.yaml: spede \(line \d+\): unknown key; did you mean speed"),
         ("duration: -3", r"duration \(line 6\): -3 is impossible; it must be at least 0.1"),
         ("duration: 10 kg", r"duration \(line 6\): .*measures a mass"),
-        ("duration: 10\ntools: [plough]", r"the key stands twice"),
+        ("duration: 10\ntools: [plough]", r"the key occurs twice"),
         ("duration: 10\nvehicle: tractor", r"vehicle: nothing called 'tractor' in the library's vehicles"),
         (
             "duration: 10\nextends: acuracy-clean",

@@ -220,7 +220,10 @@ def _settings(path: Path | None) -> dict[str, Any]:
     known = about.get("settings", {})
     if not {"noise", "held"} <= set(known):
         raise InputError(
-            "holds no settings", file=path, place="--settings", hint="estimate the log anew with this version"
+            "contains no settings",
+            file=path,
+            place="--settings",
+            hint="estimate the log again with this version",
         )
     driveline = about.get("driveline")
     if driveline is not None and "engine" not in driveline:

@@ -115,7 +115,7 @@ def nis_consistency(
     values, degrees = _finite_rows((nis, channels), mask, least=1)
     values, degrees = values[degrees > 0], degrees[degrees > 0]
     if not len(values):
-        raise InputError("no row took a measurement, so there is no NIS to judge")
+        raise InputError("no row used a measurement, so there is no NIS to judge")
     tail = (1.0 - probability) / 2.0
     low, high = chdtri(degrees, 1.0 - tail), chdtri(degrees, tail)
     within = float(np.mean((values >= low) & (values <= high)))
@@ -152,5 +152,5 @@ def _finite_rows(arrays: tuple[ArrayLike, ...], mask: ArrayLike | None, least: i
     if mask is not None:
         rows &= np.asarray(mask, dtype=np.bool_)
     if int(rows.sum()) < least:
-        raise InputError(f"only {int(rows.sum())} rows hold numbers in every column; {least} are needed")
+        raise InputError(f"only {int(rows.sum())} rows have numbers in every column; {least} are needed")
     return [column[rows] for column in columns]

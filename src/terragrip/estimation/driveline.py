@@ -34,11 +34,11 @@ _SUMS = ("adhesion_driven", "net_traction_driven", "efficiency_driven", "soil_re
 _LEAST = 0.02  # as the kernel: an adhesion below it divides nothing
 _NOTE = (
     "The drive torque is the engine's through the driveline: adhesion_driven, net_traction_driven and efficiency_driven are of all driven "
-    "wheels together; single wheels' adhesion cannot be had. Rows without a torque (standstill, gear shifts) hold none."
+    "wheels together; the adhesion of single wheels is not determined. Rows without a torque (standstill, gear shifts) hold none."
 )
 _TOWING = (
-    "There is no drawbar_force: what a tool pulls is in soil_resistance, "
-    "so net traction and efficiency are as if there were no tool."
+    "There is no drawbar_force: the pull of a tool is part of soil_resistance, "
+    "so net traction and efficiency are those without a tool."
 )
 
 

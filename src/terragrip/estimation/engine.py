@@ -215,8 +215,8 @@ _STATUS = {
     1: "a count or a constant is out of range",
     2: "a number is infinite or missing",
     3: "a number that must be positive is not",
-    4: "time does not run forward",
-    5: "the estimate left the finite numbers",
+    4: "time does not increase",
+    5: "the estimate is no longer finite",
     6: "the snapshot is damaged, or of another version or machine",
 }
 _HINTS = {

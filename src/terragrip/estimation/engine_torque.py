@@ -67,7 +67,7 @@ class EngineTorque:
             reference = np.nan
         elif reference is None or not reference > 0:
             raise InputError(
-                "is a share of a reference torque that neither the log nor the vehicle file gives",
+                "is a share of the reference torque, which neither the log nor the vehicle file gives",
                 file=source,
                 place="column engine_torque_share",
                 hint="add 'reference_torque: 800 N m' under 'driveline', from the engine's data sheet",

@@ -120,7 +120,9 @@ class Estimates:
         from terragrip.vehicle import Vehicle
 
         if "vehicle" not in self.about:
-            raise InputError("the estimates hold no vehicle", hint="estimate the log anew with this version")
+            raise InputError(
+                "the estimates contain no vehicle", hint="estimate the log again with this version"
+            )
         return Vehicle.from_dict(self.about["vehicle"])
 
     @property
@@ -227,7 +229,10 @@ class Estimates:
         missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
         if missing:
             raise InputError(
-                "this is no table of estimates", file=source, place=f"column {missing[0]}", hint="is missing"
+                "is missing, so this is not a table of estimates",
+                file=source,
+                place=f"column {missing[0]}",
+                hint="give a file written by 'terragrip estimate'",
             )
         about = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
         notes = tuple(about.pop("notes", ()))
@@ -274,7 +279,7 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
         return reading(os.fspath(path))
     except pa.ArrowInvalid as error:
         raise InputError(
-            "is no Parquet file, or is damaged", file=path, hint="write it anew with terragrip estimate"
+            "is not a Parquet file, or is damaged", file=path, hint="write it again with 'terragrip estimate'"
         ) from error
     except OSError as error:
         raise unreadable(path, error) from error

@@ -340,4 +340,4 @@ def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:
             return InputError(
                 f"{name} is {value!r}", place=f"sample at time {sample.get('time')!r}", hint=hint
             )
-    return InputError("the sample holds a value that is no finite number", hint="give SI numbers")
+    return InputError("a value of the sample is not finite", hint="give SI numbers")

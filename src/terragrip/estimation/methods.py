@@ -62,8 +62,10 @@ METHODS: dict[str, Method] = {
 }
 DEFAULT = "bank"
 
-SLIP_ONLY = Method("slip-only", "slip from speeds, where no torque is measured; taken by itself", kind=SPEEDS)
-"""No choice among `METHODS`: what the channels hold decides."""
+SLIP_ONLY = Method(
+    "slip-only", "slip from speeds, where no torque is measured; chosen automatically", kind=SPEEDS
+)
+"""Not one of `METHODS`: the channels of the log decide."""
 
 
 def method_named(name: str, *, smooth: bool = False) -> Method:

@@ -21,7 +21,7 @@ _BLIND = 5  # rows with rims at rest while the vehicle moves
 _WIDEST = 0.5  # m/s: a wider dead band is a missing speed
 WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
-    "resistance, net traction and efficiency cannot be had."
+    "resistance, net traction and efficiency need a torque."
 )
 
 
@@ -57,11 +57,11 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)
     if rows:
-        why = f"while the vehicle moves, at up to {band:.2g} m/s: what is slower they do not see, so slip is left open there (event gap)."
+        why = f"while the vehicle moves, at up to {band:.2g} m/s: they cannot measure less, so slip is missing there (event gap)."
         if band == _WIDEST:
             why = (
-                f"where ground_speed says {band:.2g} m/s and more: wheel speeds that are missing, or a ground speed that is wrong at rest. "
-                "Slip is left open where the rims are slower (event gap)."
+                f"where ground_speed is {band:.2g} m/s or more: wheel speeds are missing, or the ground speed is wrong at rest. "
+                "Slip is missing where the rims are slower (event gap)."
             )
         notes.append(f"The rims read 0 in {rows} rows {why}")
     notes += _against_travel(log, rims)
@@ -75,7 +75,7 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
         if not learns:
             return []
         return [
-            "The log is too short to tell the zero-slip radius: slip is against the speed as the machine gives it, to about "
+            "The log is too short to determine the zero-slip radius: slip counts from the speed that the machine reports, to about "
             f"{rim.spread:.0%}."
         ]
     base = rim.scale if rim.wheel == DRIVE else rim.radius
@@ -87,7 +87,7 @@ def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
         )
     else:
         at, beside = (
-            f"ground speed in this log: {zero.ratio:.4f} ± {zero.std:.4f} of the speed that the machine gives",
+            f"ground speed in this log: {zero.ratio:.4f} ± {zero.std:.4f} of the speed that the machine reports",
             "",
         )
     sentence = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
@@ -129,5 +129,5 @@ def _against_travel(log: Recording, rims: Sequence[Rim]) -> list[str]:
     if not odd:
         return []
     return [
-        f"The wheel speed of {', '.join(odd)} is against the travel: write 'sign: -1' for it in the profile."
+        f"The wheel speed of {', '.join(odd)} is against the direction of travel: write 'sign: -1' for it in the profile."
     ]

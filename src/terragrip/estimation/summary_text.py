@@ -20,7 +20,13 @@ NORMAL_95 = 1.959963984540054
 _EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
 _MOST_LABELS = 8  # rows of the table
 _SHOWN = ("slip", "adhesion", "efficiency")
-_DOUBTFUL = ("check ", "may be in km/h", "taken for km/h", "against the travel", "are wrong there")
+_DOUBTFUL = (
+    "check ",
+    "may be in km/h",
+    "converted from km/h",
+    "against the direction of travel",
+    "are wrong there",
+)
 
 
 def summary_text(tally: Tally, notes: tuple[str, ...], output: str | None) -> str:
@@ -147,7 +153,7 @@ def _assumed(tally: Tally) -> list[str]:
         )
     elif tally.about.get("method") != "slip-only":
         said.append(
-            "no constant is considered as unknown, so the intervals hold the sensors' noise alone ('uncertainty' in the vehicle file)"
+            "no constant is considered as unknown, so the intervals cover the sensors' noise alone ('uncertainty' in the vehicle file)"
         )
     if vehicle and not vehicle.get("calibration"):
         said.append("the vehicle is not calibrated")
@@ -179,9 +185,9 @@ def _next(tally: Tally, notes: tuple[str, ...], output: str | None) -> str:
     """What to do next, one sentence."""
     file = output or "ESTIMATES"
     if any(doubt in note for note in notes for doubt in _DOUBTFUL):
-        return "settle what the notes doubt (units, signs) by a profile, and estimate again ('terragrip inspect LOG')."
+        return "correct the units and signs that the notes question in a profile, and estimate again ('terragrip inspect LOG')."
     if not tally.sample or not len(tally.columns["label"]):
-        return "see what the log holds ('terragrip inspect LOG')."
+        return "see what the log contains ('terragrip inspect LOG')."
     if tally.about.get("method") == "slip-only":
         calibrated = tally.about.get("vehicle", {}).get("calibration")
         light = "" if calibrated else "'terragrip calibrate' on a pass without load makes slip absolute; "

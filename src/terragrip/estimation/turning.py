@@ -58,8 +58,8 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     if share < _MUCH:
         return []
     return [
-        f"The rims of left and right differ in {share:.0%} of the driving, and nothing says how fast the machine turned: the slips of both "
-        "sides are wrong there. Give a yaw rate, or positions."
+        f"The rims of left and right differ in {share:.0%} of the driving, and no signal shows how fast the machine turned: the slips of "
+        "both sides are wrong there. Give a yaw rate, or positions."
     ]
 
 

@@ -55,7 +55,7 @@ def plot(estimates: Estimates, kind: Kind, quantity: str) -> Figure:
     if kind not in _KINDS:
         raise InputError(f"there is no plot {kind!r}", hint=f"take one of {', '.join(_KINDS)}")
     if not len(estimates):
-        raise InputError("there is no row to draw", hint="estimate a log with rows")
+        raise InputError("there is no row to draw", hint="estimate a log that has rows")
     return _KINDS[kind](estimates, quantity)
 
 
@@ -170,9 +170,7 @@ def _plane(estimates: Estimates, quantity: str) -> Figure:
 def _map(estimates: Estimates, quantity: str) -> Figure:
     """The track in metres east and north of its first position, coloured by a quantity, the wheels' mean."""
     if "latitude" not in estimates or "longitude" not in estimates:
-        raise InputError(
-            "the log holds no positions to draw", hint="name latitude and longitude in a profile"
-        )
+        raise InputError("the log has no positions to draw", hint="name latitude and longitude in a profile")
     columns = list(_columns(estimates, quantity).values())
     if not columns:
         known = [q for q in ("slip", "adhesion", "ground_speed", "soil_resistance") if _columns(estimates, q)]

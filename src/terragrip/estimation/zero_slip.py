@@ -33,7 +33,7 @@ UNTOLD = 0.03
 """Relative SD of a radius that nothing tells but the machine itself: worn or other tires, other pressure."""
 
 _ALIKE: Mapping[str, float] = MappingProxyType({})  # wheels of one radius
-REMEDY = "record 40 s without load too (headland, road), or say which rows are without load (terragrip calibrate --light FROM:TO)"
+REMEDY = "also record 40 s without load (headland, road), or state which rows are without load (terragrip calibrate --light FROM:TO)"
 _SLOWEST = 0.3  # m/s
 _GOING = 0.5  # of the window's mean speed: slower samples are stops
 _TURNING = 0.05  # rad/s
@@ -113,14 +113,14 @@ def _judged(ratio: Floats, fast: Bools) -> Zero:
     if of_road or (len(modes) > 1 and 1 - value <= _BEHIND):
         return Zero(value, std, count)
     if len(modes) > 1:
-        why = f"it runs {1 - value:.0%} behind the supposed radius, so that it is lighter field work as likely as another radius: {REMEDY}"
+        why = f"it is {1 - value:.0%} below the supposed radius: another radius or, as likely, lighter field work: {REMEDY}"
         return Zero(value, float(np.hypot(std, max(UNTOLD, (1 - value) / 2))), count, why)
     if abs(value - 1) <= _NEAR:
         why = f"all windows slip alike, so light work cannot be distinguished from field work: {REMEDY}"
         return Zero(value, float(np.hypot(std, UNTOLD)), count, why)
     why = (
-        f"all windows slip alike and run {abs(1 - value):.0%} {'behind' if value < 1 else 'ahead of'} the supposed radius, so that it is "
-        f"field work as likely as another radius: {REMEDY}"
+        f"all windows slip alike and are {abs(1 - value):.0%} {'below' if value < 1 else 'above'} the supposed radius: another "
+        f"radius or, as likely, field work: {REMEDY}"
     )
     return Zero(1.0, UNTOLD, count, why)
 

@@ -32,7 +32,7 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         )
         if silent and not (origin.optional or partial):
             assert result is not None
-            problem = 'holds no value: it was sent as "not available" or "error" throughout'
+            problem = 'has no value: it was sent as "not available" or "error" throughout'
             hint = "name another source in the profile, or join a log that has it (--with)"
             raise InputError(problem, file=log.source, place=f"signal {', '.join(result.columns)}", hint=hint)
         if result is not None and not silent:

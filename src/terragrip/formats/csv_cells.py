@@ -31,7 +31,7 @@ def chosen_of(dialect: Dialect, chosen: set[str], source: str) -> list[int]:
     places = [k for k, name in enumerate(names) if name in chosen]
     twice = next((names[k] for k in places if names.count(names[k]) > 1), None)
     if twice is not None:
-        raise InputError("stands twice", file=source, place=f"column {twice}", hint="keep one of them")
+        raise InputError("occurs twice", file=source, place=f"column {twice}", hint="keep one of them")
     return places
 
 

@@ -76,7 +76,7 @@ def _guarded(source: str, work: Callable[[], Any]) -> Any:
 def _refuse_twice(names: tuple[str, ...], chosen: list[str], source: str) -> None:
     twice = next((name for name in chosen if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError("stands twice", file=source, place=f"column {twice}", hint="keep one of them")
+        raise InputError("occurs twice", file=source, place=f"column {twice}", hint="keep one of them")
 
 
 FORMATS = (

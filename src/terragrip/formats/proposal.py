@@ -39,7 +39,7 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
         return notes
     notes += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
     if "drawbar_force" not in proposals:
-        notes.append("No drawbar force was found: the vehicle is taken to tow nothing.")
+        notes.append("No drawbar force was found: the vehicle is assumed to tow nothing.")
     if "acceleration_x" not in proposals:
         notes.append(
             "No acceleration_x was found: soil resistance is estimated from speed alone, more slowly."

@@ -138,7 +138,7 @@ def silent(
             continue
         if guess.channel.startswith(("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_")):
             known = values[np.isfinite(values)]
-            held = f"is {known[0]:.4g} throughout" if len(known) else "holds no value"
+            held = f"is {known[0]:.4g} throughout" if len(known) else "has no value"
             notes.append(f"{name} goes by the name of {guess.channel}, but {held}.")
     return notes[:6]
 

@@ -120,13 +120,13 @@ def _evidence(lag: Lag) -> str:
 
 def _sentence(lag: Lag) -> str:
     return (
-        f"ground_speed was {_evidence(lag)}; it was set right by {abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and how "
-        "much, write it as 'delay:' in a profile."
+        f"ground_speed was {_evidence(lag)}; it was shifted by {abs(lag.of_the_clock):.3f} s. If you know which sensor is late, and by how "
+        "much, give its 'delay:' in a profile."
     )
 
 
 def _doubt(lag: Lag) -> str:
     return (
-        f"ground_speed is {_evidence(lag)}, which is too uncertain to set right: if a sensor is late, write "
+        f"ground_speed is {_evidence(lag)}, which is too uncertain to correct: if a sensor is late, write "
         f"'delay: {abs(lag.seconds):.2f} s' for it in a profile."
     )

@@ -67,8 +67,8 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         if min(off) * max(off) > 0 and abs(least) > uneven and min(map(abs, left)) < _RESTORED * abs(least):
             strong, weak = (names[a], names[b]) if least > 0 else (names[b], names[a])
             return [
-                f"At like slip the axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as {weak}, and with exchanged "
-                "masses they would pull alike: check the masses of the axles, and which axle each torque is of."
+                f"At equal slip the axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as {weak}, and with exchanged "
+                "masses they would pull alike: check the masses of the axles, and the axle of each torque."
             ]
     return []
 

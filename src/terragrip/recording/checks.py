@@ -62,7 +62,7 @@ def remarks(columns: Collection[str]) -> list[str]:
         more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
         notes.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
     if "drawbar_force" not in columns:
-        notes.append("There is no drawbar_force: the vehicle is taken to tow nothing.")
+        notes.append("There is no drawbar_force: the vehicle is assumed to tow nothing.")
     return notes
 
 
@@ -87,9 +87,7 @@ def require_hitch(vehicle: Vehicle, channels: Collection[str], source: str | Non
         and len(vehicle.axles) > 1
         and "hitch_overhang" not in vehicle.model_fields_set
     ):
-        hint = (
-            "add e.g. 'hitch_overhang: 1.1 m', from the last axle back to where it hangs, to the vehicle file"
-        )
+        hint = "add e.g. 'hitch_overhang: 1.1 m', from the last axle back to the hitch, to the vehicle file"
         problem = "it moves load between the axles, but the vehicle has no hitch_overhang"
         raise InputError(problem, file=source, place="column hitch_load", hint=hint, page="vehicle#all-keys")
 
@@ -142,23 +140,21 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     last = before if row == 0 else time[row - 1]
     again = float(np.mean(np.diff(time) == 0))
     if time[row] == last and again > _ROUNDED:
-        problem = (
-            f"time repeats, as {again:.0%} of the stamps here do: they are rounded, or kept in too few digits"
-        )
+        problem = f"time repeats, as {again:.0%} of the stamps here do: they are rounded, or stored with too few digits"
         hint = "write time with more digits"
     elif time[row] == last:
-        problem, hint = "time repeats", "keep one row an instant"
+        problem, hint = "time repeats", "keep one row per instant"
     else:
-        problem, hint = f"time runs back from {last:.10g} s", _way_out(float(last - time[row]), time, row)
+        problem, hint = f"time goes back from {last:.10g} s", _way_out(float(last - time[row]), time, row)
     raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), hint=hint)
 
 
 def _way_out(back: float, time: Floats, row: int) -> str:
     """What to do where time runs back by ``back`` [s] at a row."""
     if abs(back - _HOUR) < _ROUGHLY:
-        return "a clock that was set to winter time? Write times in UTC, or add 3600 s from there on"
+        return "was the clock set to winter time? Write times in UTC, or add 3600 s from there on"
     if row > 1 and time[row] <= time[1]:
-        return "another log begins there, it seems: split it"
+        return "split the log there: another one seems to begin"
     return "sort the rows, or split the log there"
 
 
@@ -177,5 +173,5 @@ def refuse_infinite(
 def refuse_empty(name: str, source: str | None) -> None:
     """Raise InputError if a channel without any value is one that estimates need."""
     if name.startswith(_ESSENTIAL):
-        hint = "fill it, or leave the column out"
-        raise InputError("holds no value", file=source, place=f"column {name}", hint=hint)
+        hint = "fill it, or remove the column"
+        raise InputError("has no value", file=source, place=f"column {name}", hint=hint)

@@ -44,7 +44,7 @@ def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Record
         shown = " and ".join(f"{code:.6g}" for code in codes)
         notes.append(
             f"{name} is {shown} in {bad.sum()} rows and at most {np.nanmax(np.abs(channels[name])):.3g} in all others: a code for "
-            f"'not measured', it seems. Leave these cells empty, or write 'invalid: [...]' in the profile, with the log's own numbers."
+            f"'not measured', it seems. Leave these cells empty, or write 'invalid: [...]' in the profile, in the log's own numbers."
         )
     return (replace(recording, channels={**recording.channels, **channels}) if channels else recording), notes
 

@@ -41,7 +41,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
     columns: dict[str, npt.NDArray[Any]] = {}
     for name, values in pairs:
         if str(name) in columns:
-            raise InputError("stands twice", file=source, place=f"column {name}", hint="keep one of them")
+            raise InputError("occurs twice", file=source, place=f"column {name}", hint="keep one of them")
         column = _array(str(name), values, source)
         if columns and len(column) != len(next(iter(columns.values()))):
             problem = f"has {len(column)} rows, the first column {len(next(iter(columns.values())))}"
@@ -54,7 +54,7 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
     """A column as float64, missing = NaN; raises InputError at the first cell that is not a number."""
     if time is not None and len(column) != len(time):
         problem = f"has {len(column)} rows, time has {len(time)}"
-        raise InputError(problem, file=source, place=f"column {name}", hint="give one value an instant")
+        raise InputError(problem, file=source, place=f"column {name}", hint="give one value per instant")
     if column.dtype.kind in "fiub":
         return column.astype(np.float64, copy=False)
     if column.dtype.kind in "OUST":
@@ -126,7 +126,7 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
     """A label column as text (n,), empty where there is none; equal labels share one string."""
     if len(column) != rows:
         problem = f"has {len(column)} rows, time has {rows}"
-        raise InputError(problem, file=source, place=f"column {name}", hint="give one label an instant")
+        raise InputError(problem, file=source, place=f"column {name}", hint="give one label per instant")
     if column.dtype.kind == "f" and np.isnan(column).all():
         return np.full(rows, "", dtype=object)
     try:

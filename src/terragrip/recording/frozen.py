@@ -32,7 +32,7 @@ def frozen_warnings(recording: Recording) -> list[str]:
     if ground is not None and is_one_value(ground) and any(not is_one_value(speeds[name]) for name in rims):
         value = ground[np.isfinite(ground)][0]
         notes.append(
-            f"ground_speed ({value:.3g}) never changes while the wheels turn: a sensor that is dead, or a wrong column."
+            f"ground_speed ({value:.3g}) never changes while the wheels turn: the sensor is dead, or the column is wrong."
         )
     acceleration = recording.channels.get("acceleration_x")
     if (
@@ -42,7 +42,7 @@ def frozen_warnings(recording: Recording) -> list[str]:
     ):
         value = acceleration[np.isfinite(acceleration)][0]
         notes.append(
-            f"acceleration_x ({value:.3g}) never changes while the speed does: a sensor that is dead, or a wrong column."
+            f"acceleration_x ({value:.3g}) never changes while the speed does: the sensor is dead, or the column is wrong."
         )
     for name in speeds:
         others = [
@@ -120,7 +120,7 @@ def _repeats(
             []
             if forces
             else [
-                f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip are off by half a step as long as it keeps "
+                f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
                 "one value. Log it in finer steps."
             ]
         )
@@ -139,7 +139,7 @@ def _repeats(
     return [
         f"{name} repeats {value:.4g} from {start:.4g} to {start + seconds:.4g} s"
         + (f", and {len(found) - 1} times more," if len(found) > 1 else "")
-        + f" while other {'torques' if forces else 'speeds'} change: no measurement, it seems. Leave these cells empty: the intervals "
+        + f" while other {'torques' if forces else 'speeds'} change: not measured, it seems. Leave these cells empty: the intervals "
         "then show how little is known."
     ]
 

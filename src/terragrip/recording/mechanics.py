@@ -207,7 +207,7 @@ def _balance_warnings(
                 f"{flat} but its opposite, and the drive torques contradict it too: {_SIGN.format('it')}."
             ]
         return [
-            f"{flat} but {1 / together.slope:.2g} times what the drive torques make of {vehicle.mass:.4g} kg: it may be in g (write "
+            f"{flat} but {1 / together.slope:.2g} times what the drive torques give for {vehicle.mass:.4g} kg: it may be in g (write "
             "'unit: g' in the profile), or not the axis that points forward."
         ]
     if driven.is_off() and driven.distance > moved.distance:
@@ -241,9 +241,9 @@ def _exchanged(
     if plain > _ALIKE or max(turned, other) < _CLEAR:
         return ""
     if other > turned:
-        return "acceleration_y goes with the drive torques and acceleration_x does not: the two axes may be exchanged."
+        return "acceleration_y varies with the drive torques and acceleration_x does not: the two axes may be exchanged."
     names = ", ".join(f"drive_torque_{wheel}" for wheel, sign in signs.items() if sign < 0)
-    return f"{names}: the other wheels' torques go with acceleration_x, and these against it; {_SIGN.format('each')}."
+    return f"{names}: the other wheels' torques vary with acceleration_x, and these against it; {_SIGN.format('each')}."
 
 
 def _thrust_warnings(means: Means, thrusts: dict[str, Floats], vehicle: Vehicle | None) -> list[str]:
@@ -270,7 +270,7 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     if scale < 0:
         return f"The drive torques fall where the vehicle is driven harder: {_SIGN.format('each')}."
     return (
-        f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg like this: check the "
+        f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg in this way: check the "
         "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."
     )
 
@@ -294,7 +294,7 @@ def _pull_warnings(
     if rest < -_PULL:
         return [
             f"The drive torques over the wheel radius are {rest + pulled:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
-            "which leaves nothing that could drive the vehicle: check the units of both, and that each wheel's torque is there."
+            "which leaves nothing to drive the vehicle: check the units of both, and that each wheel has its torque."
         ]
     if 0 < quantile(np.abs(pull[known]), 0.95) < _NO_PULL:
         return [
@@ -331,7 +331,7 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
             verb = "change" if len(still) > 1 else "changes"
             notes.append(
-                f"{shown} never {verb} while the vehicle drives: a sensor that is dead, or a wrong column."
+                f"{shown} never {verb} while the vehicle drives: the sensor is dead, or the column is wrong."
             )
     return notes
 
@@ -359,7 +359,7 @@ def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> li
         float(np.median([driven_radii(vehicle)[w] for w in off])),
     )
     return [
-        f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, which no ground lets them: they roll "
-        f"{apparent:.3g} m a radian, and their radius is stated as {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
-        "the ticks a turn."
+        f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, more than any ground allows: they roll "
+        f"{apparent:.3g} m per radian, but the stated radius is {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
+        "the ticks per turn."
     ]

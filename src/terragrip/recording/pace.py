@@ -40,7 +40,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     changes = _changes(time, speed, rims)
     if changes > _GRIP:
         return [
-            f"ground and wheels change their speed by {changes:.3g} m/s², as no ground lets them: {_CLOCK}."
+            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_CLOCK}."
         ]
     rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
     some = rows[:: max(1, len(rows) // _ENOUGH)]
@@ -78,8 +78,8 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if (white_noise(*measured_part(recording.time, ground)) or 0.0) < _SHARED * size:
         return []
     return [
-        "ground_speed is made of the wheels' speeds (odometry): slip is then what it was made with, and no measurement. Give a speed over "
-        "ground: of a receiver, a radar, or positions ('derivative_of')."
+        "ground_speed is made of the wheels' speeds (odometry): slip from it is not a measurement. Give a speed over "
+        "ground: from a receiver, a radar, or positions ('derivative_of')."
     ]
 
 

@@ -27,8 +27,8 @@ _CAUSES = (
     (1.745, "the grade in per cent, declared as degrees: write 'unit: \"%\"'"),
     (100.0, "the grade in per cent: write 'unit: \"%\"'"),
     (57.3, "in degrees: write 'unit: deg'"),
-    (1 / 57.3, "in radians, and was taken for degrees: write 'unit: rad'"),
-    (0.01, "a grade, and was taken for one in per cent: write 'unit: rad'"),
+    (1 / 57.3, "in radians, but was converted from degrees: write 'unit: rad'"),
+    (0.01, "a grade, but was converted from per cent: write 'unit: rad'"),
 )
 
 
@@ -45,7 +45,7 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     roll = recording.channels.get("roll")
     if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(seen, means.of(np.sin(roll))).alike):
         return [
-            "The accelerometer shows climbs that go with roll and not with pitch: the two may be exchanged."
+            "The accelerometer shows climbs that vary with roll and not with pitch: the two may be exchanged."
         ]
     if fit.alike < _ALIKE:
         return []

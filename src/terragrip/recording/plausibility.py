@@ -36,9 +36,9 @@ _RATIOS = (
     (9.5493, "wheel_speed may be in rpm: 1 rpm is 0.1047 rad/s"),
     (57.296, "wheel_speed may be in deg/s: 1 deg/s is 0.01745 rad/s"),
     (1 / 3.6, "ground_speed may be in km/h: 1 km/h is 0.2778 m/s"),
-    (0.10472, "wheel_speed may be in rpm divided twice, or ground_speed 9.55 times too fast"),
+    (0.10472, "wheel_speed may have been converted from rpm twice, or ground_speed is 9.55 times too fast"),
     (0.15915, "wheel_speed may be in revolutions per second: 1 rev/s is 6.283 rad/s"),
-    (0.017453, "wheel_speed may have been taken from degrees to radians twice"),
+    (0.017453, "wheel_speed may have been converted from degrees to radians twice"),
     (1e-2, "ground_speed may be in cm/s"),
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
@@ -130,7 +130,7 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             return []
         return [
             f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
-            "radii, and which wheel each column is of."
+            "radii, and the wheel of each column."
         ]
     return [
         f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
@@ -160,7 +160,7 @@ def _drive_warnings(recording: Recording) -> list[str]:
         high, low = low, high
     apart = max(ratio, 1 / ratio)
     why = (
-        f"{high} may be in km/h, or {low} was taken for km/h and is in m/s"
+        f"{high} may be in km/h, or {low} was converted from km/h and is in m/s"
         if 2.5 < apart < 5.5
         else "check units"
     )
@@ -183,16 +183,18 @@ def _position_warnings(recording: Recording, track: Track | None, *, wheels_agre
         return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
     if result < 1 / _TOO_FAST:
         clock = (
-            " The wheels go with it: time may not be in seconds." if wheels_agree and result < 1 / 3 else ""
+            " The wheel speeds agree with it: time may not be in seconds."
+            if wheels_agree and result < 1 / 3
+            else ""
         )
         return [f"{sentence}: check its unit and scale.{clock}"]
     if 2.9 < result < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
-        return [f"{sentence}: it was taken for km/h, and may be in m/s."]
+        return [f"{sentence}: it was converted from km/h, but may be in m/s."]
     ahead = _straight_ahead(recording, track, _LONG_WAY)
     if ahead > _TOO_SLOW:
         return [
-            f"In a straight line the positions come {ahead:.3g} times as far as ground_speed makes: check its unit and scale "
-            "(a knot is 1.852 km/h, a mile an hour 1.609), and that latitude and longitude are not exchanged."
+            f"In a straight line the positions move {ahead:.3g} times as far as ground_speed does: check its unit and scale "
+            "(a knot is 1.852 km/h, a mile per hour 1.609), and that latitude and longitude are not exchanged."
         ]
     return []
 

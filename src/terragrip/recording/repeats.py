@@ -30,7 +30,7 @@ class Repeats:
         if not self.merged:
             return []
         counted = "1 row repeats" if self.merged == 1 else f"{self.merged} rows repeat"
-        return [f"{counted} the time of the row before without another value: put together with it."]
+        return [f"{counted} the time of the row before without another value: merged with it."]
 
 
 def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column], Repeats]:

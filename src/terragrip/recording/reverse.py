@@ -24,7 +24,7 @@ _ALIKE = 0.9  # of the rows, or windows, that have one sign
 _FEWEST = 5  # windows
 _TOGETHER = 0.7  # correlation
 
-_WRONG = "in turns backward the slips of both sides are wrong."
+_WRONG = "in reverse turns the slips of both sides are wrong."
 
 
 def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
@@ -44,7 +44,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         ahead = moving & (rim > 0)
         if ahead.any() and np.mean(speed[back] > 0) > _ALIKE and np.mean(speed[ahead] > 0) > _ALIKE:
             return [
-                f"ground_speed has no sign: it is positive also while the wheels turn backward, and {_WRONG} Give it the sign of the "
+                f"ground_speed has no sign: it is positive while the wheels turn backward too, and {_WRONG} Give it the sign of the "
                 "direction (in a profile 'forward:', with positions)."
             ]
         return []
@@ -64,7 +64,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if not 1 - _ALIKE < against < _ALIKE:
         return []
     return [
-        f"In {against:.0%} of the turns angular_velocity_z goes against the wheels' speeds: where these have no sign, that is backward, "
+        f"In {against:.0%} of the turns angular_velocity_z contradicts the wheels' speeds: if these have no sign, that is reverse travel, "
         f"and {_WRONG} Give wheel and ground speeds the sign of the direction."
     ]
 

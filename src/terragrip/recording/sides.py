@@ -73,8 +73,8 @@ def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     if not odd:
         return []
     return [
-        f"{', '.join(odd)} (or these wheels' speeds) may be exchanged: in turns the wheel that is faster than its hub would brake, and the "
-        "slower one pull. Check which wheel each column is of."
+        f"{', '.join(odd)} (or these wheels' speeds) may be exchanged: in turns the wheel that is faster than its hub would brake and the "
+        "slower one pull. Check the wheel of each column."
     ]
 
 
@@ -147,7 +147,7 @@ def _backward_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             odd.append(wheel)
     return (
         [
-            f"The wheel speed of {', '.join(odd)} is against that of all others: write 'sign: -1' for it in the profile."
+            f"The wheel speed of {', '.join(odd)} is opposite to that of all others: write 'sign: -1' for it in the profile."
         ]
         if odd
         else []
@@ -199,7 +199,7 @@ def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
     a, b = axle.wheels
     return [
         f"Straight ahead the rim of {a} goes {ratio:.2f} times as fast as that of {b}: check the scale of wheel_speed_{a} and "
-        f"wheel_speed_{b} (ticks a turn, gear ratio), and both radii."
+        f"wheel_speed_{b} (ticks per turn, gear ratio), and both radii."
     ]
 
 

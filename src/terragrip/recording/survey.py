@@ -100,7 +100,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
     else:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
-    notes = [f"{name} holds no value and is left out." for name in empty]
+    notes = [f"{name} has no value and is left out." for name in empty]
     delay = last.delay
     result = Survey(
         rows, sample, empty, delay_of(lag_within(*first_speeds(beginning))) if delay is None else delay

@@ -83,7 +83,7 @@ class Recording:
         for name, values in result.channels.items():
             if np.isnan(values).all():
                 checks.refuse_empty(name, source)
-                remarks.append(f"{name} holds no value and is left out.")
+                remarks.append(f"{name} has no value and is left out.")
             else:
                 channels[name] = values
         notes = tuple(dict.fromkeys(remarks))

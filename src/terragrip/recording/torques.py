@@ -58,7 +58,7 @@ def _scale_warnings(
     check = "(at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass"
     if mean > _MOST:
         return [
-            f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, which no ground carries: check "
+            f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, which no ground can bear: check "
             f"the torques' unit and scale {check}."
         ]
     if mean < -_BRAKING:
@@ -76,7 +76,7 @@ def _scale_warnings(
         return _pull_scale(means.fit(thrust - moved, pull))
     return [
         f"The drive torques over the wheel radius are {fit.slope:.2g} times the drawbar force and the force that moves "
-        f"{vehicle.mass:.4g} kg like this: check the units of both, the torques' scale {check}."
+        f"{vehicle.mass:.4g} kg in this way: check the units of both, the torques' scale {check}."
     ]
 
 
@@ -159,6 +159,6 @@ def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     )
     what = "drawbar force and wheel speeds" if towing else "the wheel speeds"
     return [
-        f"The drive torques are {abs(seconds):.2f} s {side} {what}, by the force that these take (correlation {alike:.2f}, "
-        f"{without:.2f} as they are): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile."
+        f"The drive torques are {abs(seconds):.2f} s {side} {what}, judged by the force that these require (correlation {alike:.2f}, "
+        f"{without:.2f} unshifted): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile."
     ]

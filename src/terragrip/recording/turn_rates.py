@@ -62,7 +62,7 @@ def turn_rate_warnings(recording: Recording, vehicle: Vehicle | None, track: Tra
         )
         return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
     or_else = (
-        " If you are sure of it, left and right wheels are exchanged."
+        " If its sign is right, left and right wheels are exchanged."
         if against == ["the wheels' speeds"]
         else ""
     )

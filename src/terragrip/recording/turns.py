@@ -121,8 +121,8 @@ def _of_wheels(recording: Recording, vehicle: Vehicle, quantity: str) -> Floats 
 def _sentence(quantity: str, vehicle: Vehicle, found: list[tuple[int, int]], where: str) -> str:
     pairs = [" and ".join(f"{quantity}_{vehicle.wheels[k]}" for k in pair) for pair in found]
     return (
-        f"{', or '.join(pairs)} may be exchanged: {where} left and right wheels do not go together from axle to axle as they are, and "
-        "would then. Check which wheel each column is of, torques too."
+        f"{', or '.join(pairs)} may be exchanged: {where} left and right wheels do not agree between the axles now, but "
+        "would then. Check the wheel of each column, torques too."
     )
 
 

@@ -49,9 +49,9 @@ def test_quantities_that_the_file_knows_better_are_left_out(vehicle: Vehicle) ->
         [quantity("wheel_radius", 2.0, 0.05)], stating(vehicle, wheel_radius=0.01), unknown
     )
     assert relative == []
-    assert unknown[-1].why == "determined to 2.5 % only, and the vehicle file knows it to 1 %: record more"
+    assert unknown[-1].why == "determined only to 2.5 %, but the vehicle file states 1 %: record more"
     procedure._useful([quantity("drawbar_offset", 2.0, 0.05)], stating(vehicle, drawbar_offset=0.01), unknown)
-    assert "determined to 0.05 1 only, and the vehicle file knows it to 0.01 1" in unknown[-1].why
+    assert "determined only to 0.05 1, but the vehicle file states 0.01 1" in unknown[-1].why
 
 
 def test_what_is_left_unknown_of_each_constant(vehicle: Vehicle) -> None:
@@ -246,7 +246,7 @@ def test_a_zero_of_slip_scales_a_radius_and_divides_a_gain(key: str, value: floa
     assert _scaled(stated, Zero(1.0, 0.03, 9, "why")) == Unknown(key, "why")
     doubted = _scaled(stated, Zero(0.99, 0.03, 9, "why"))
     assert isinstance(doubted, Quantity)
-    assert "(the interval holds the doubt: why)" in doubted.sentence
+    assert "(the interval covers the doubt: why)" in doubted.sentence
     assert isinstance(_scaled(stated, Zero(1.0, 0.02, 9)), Quantity)
 
 

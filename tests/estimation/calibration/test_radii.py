@@ -78,7 +78,7 @@ def test_a_radius_vaguer_than_the_vehicle_file_is_left_out(drive: Make, vehicle:
     result = calibrate(logs, Vehicle.from_dict(data))
     assert "wheel_radius fl" not in result
     assert result.apply(vehicle).wheel_radius == pytest.approx([0.2] * 4, rel=0)
-    assert any(u.name == "wheel_radius" and "knows it to" in u.why for u in result.unknown)
+    assert any(u.name == "wheel_radius" and "the vehicle file states" in u.why for u in result.unknown)
 
 
 def test_gains_that_the_file_knows_better_move_no_radius(drive: Make, vehicle: Vehicle) -> None:

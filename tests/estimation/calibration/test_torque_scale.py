@@ -57,7 +57,7 @@ def test_a_scale_whose_interval_holds_nothing_is_not_told(drive: Make, vehicle: 
     told = identify_torque_scale(log, vehicle)
     unsure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drawbar_gain": 0.6}})
     assert told.interval[0] > 0
-    with pytest.raises(InputError, match="only: an interval that holds 0"):
+    with pytest.raises(InputError, match="only: an interval that includes 0"):
         identify_torque_scale(log, unsure)
 
 

@@ -30,7 +30,7 @@ def test_a_circling_machine_is_asked_for_a_yaw_rate(seed: int, soft: float) -> N
     ]
     text = {u.name: u.why for u in calibration.unknown}
     assert (
-        "this machine turned in 100% of its driving and nothing says how fast: give a yaw rate"
+        "this machine turned in 100% of its driving and no signal shows how fast: give a yaw rate"
         in text["angular_velocity_z"]
     )
 
@@ -85,5 +85,5 @@ def test_speeds_in_kmh_make_no_radius() -> None:
     wrong = log.with_channels(ground_speed=log["ground_speed"] / 3.6)
     calibration = calibrate(wrong, machine())
     assert not [q.name for q in calibration.quantities if q.key == "wheel_radius"]
-    assert any("it was taken for km/h" in note for note in calibration.notes)
+    assert any("it was converted from km/h" in note for note in calibration.notes)
     assert np.isfinite([q.value for q in calibration.quantities]).all()

@@ -50,7 +50,7 @@ def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     """Rows of a table of estimates as the kernel sees them; ``measured``: whether each row's ground speed was.
 
     Where nothing tells the slope, the table's SD of the resistance holds hills, which the kernel's watch leaves out (decision 0149).
-    Raises InputError where the estimates hold no vehicle.
+    Raises InputError where the estimates contain no vehicle.
     """
     vehicle = estimates.vehicle
     driven = np.array(vehicle.driven, bool)

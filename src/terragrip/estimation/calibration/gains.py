@@ -71,7 +71,7 @@ def relative_gains(
     )
     driven = np.flatnonzero(vehicle.driven)
     if len(driven) < 2:
-        return [Unknown(key, "one driven wheel has none to be compared with")]
+        return [Unknown(key, "a single driven wheel has no other wheel to compare with")]
     table = _driving(windows(logs, vehicle, WINDOW), vehicle)
     blocks = track_blocks(table) if len(table) else np.zeros(0, dtype=np.intp)
     few = Unknown(
@@ -111,9 +111,9 @@ def _quantities(
 
     factor = float(stdtrit(fit.blocks - 1, 0.975))
     sentence = (
-        "relative to the mean of all wheels, with the loads that the vehicle file gives: torques of wheels at one "
-        f"slip on one soil compared, {fit.windows} windows on {fit.blocks} stretches of track; it assumes that "
-        "the soil under rear wheels is as under front ones"
+        "relative to the mean of all wheels, at the loads of the vehicle file: torques of wheels at the same slip "
+        f"on the same soil are compared, {fit.windows} windows on {fit.blocks} stretches of track; assumes "
+        "the same soil under rear and front wheels"
     )
     if disagreement:
         sentence += (

@@ -101,7 +101,7 @@ def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, known: Collection
     share = float(np.mean(turns_unseen(table, vehicle)[moving]))
     if share < _MUCH:
         return []
-    why = f"this machine turned in {share:.0%} of its driving and nothing says how fast: give a yaw rate (or positions)"
+    why = f"this machine turned in {share:.0%} of its driving and no signal shows how fast: give a yaw rate (or positions)"
     return [Unknown("angular_velocity_z", why)]
 
 

@@ -49,7 +49,7 @@ def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
                 f"calibrate needs the load of the vehicle file, {usual:.4g} {unit}; here it is up to {np.max(known):.4g}",
                 file=log.source,
                 place=f"column {name}",
-                hint="drive with tanks as the file has them and no tool on the hitch, or give a vehicle file of that load",
+                hint="drive with the tank contents of the vehicle file and no tool on the hitch, or give a vehicle file for this load",
             )
 
 
@@ -262,7 +262,7 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
         f"{100 * x:.2g} %" if relative else f"{x:.2g} {quantities[0].unit}" for x in (max(errors), prior)
     )
     unknown.append(
-        Unknown(key, f"determined to {worst} only, and the vehicle file knows it to {known}: record more")
+        Unknown(key, f"determined only to {worst}, but the vehicle file states {known}: record more")
     )
     return []
 
@@ -284,7 +284,7 @@ def _radii(
         f"{100 * rolling.slip:.2f} % there"
     )
     if gains is not None and determined:
-        sentence += "; what a wheel differs from the others is determined by its torque over slip"
+        sentence += "; each wheel's difference from the others follows from its torque over slip"
     return [
         Quantity(
             "wheel_radius",

@@ -54,9 +54,11 @@ def _scaled(stated: Quantity, zero: Zero | None) -> Quantity | Unknown:
         return Unknown(stated.name, "too few windows of steady motion; 40 s without load are needed")
     if zero.std >= UNTOLD and zero.ratio == 1:
         return Unknown(stated.name, zero.doubt)
-    sentence = f"ground speed over wheel speed in {zero.windows} windows of the lightest work, which are called zero slip"
+    sentence = (
+        f"ground speed over wheel speed in {zero.windows} windows of the lightest work, taken as zero slip"
+    )
     if zero.doubt:
-        sentence += f" (the interval holds the doubt: {zero.doubt})"
+        sentence += f" (the interval covers the doubt: {zero.doubt})"
     if stated.key == "wheel_based_speed_gain":
         value, std = stated.value / zero.ratio, stated.value * zero.std / zero.ratio**2
     else:

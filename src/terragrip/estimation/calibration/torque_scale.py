@@ -96,7 +96,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     error = _jackknife(rows, weight)
     if not strength > _STRONG * _no_strength(rows, weight):
         raise InputError(
-            "pull, acceleration and slope vary too little to tell the torque scale",
+            "pull, acceleration and slope vary too little to determine the torque scale",
             file=logs[0].source,
             hint="use a log with starts, stops, slopes or a towed load",
         )
@@ -104,16 +104,14 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
         np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight, residual)),
     )
-    sentence = "torques over radius against drawbar force and mass times acceleration and slope; it goes with the mass"
+    sentence = "torques over radius against drawbar force and mass times acceleration and slope; proportional to the vehicle file's mass"
     by_grade = _with_grade(vehicle, rows, weight)
     if by_grade > max(error / scale, considered):
-        sentence += (
-            "; a resistance that goes with the grade would pass for it: pull changing loads on level ground"
-        )
+        sentence += "; a resistance that varies with the grade would look the same: pull changing loads on level ground"
     std = float(np.hypot(error, scale * np.hypot(considered, by_grade)))
     if NORMAL_95 * std > abs(scale):
         raise InputError(
-            f"the torque scale is known to {NORMAL_95 * std / abs(scale):.0%} only: an interval that holds 0 says nothing",
+            f"the torque scale is known to {NORMAL_95 * std / abs(scale):.0%} only: an interval that includes 0 determines nothing",
             file=logs[0].source,
             hint="pull changing loads on level ground, or give pitch or acceleration_x",
         )

@@ -150,9 +150,7 @@ def torque_zeros(
             why = f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle"
             unknown.append(Unknown(f"{key} {wheel}", why))
         else:
-            sentence = (
-                "mean of the stops that read alike; it assumes that nothing drives or holds the wheels there"
-            )
+            sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
             entry = evidence(windows, stops, sources, windows.torque_count)
             quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
     return quantities, unknown
@@ -170,7 +168,7 @@ def drawbar_zero(
         return [], [Unknown(key, "there is no drawbar_force")]
     allowed = max(3 * (vehicle.uncertainty.drawbar_offset or 0.0), 0.01 * vehicle.mass * GRAVITY)
     stops = standstills(windows, vehicle)
-    sentence = "mean of the stops that read alike; it assumes that the bar is slack there"
+    sentence = "mean of the stops that agree; assumes that the bar is slack there"
     why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
     stops = resting(windows.drawbar[:, None], stops, windows.drawbar_count, noise)
     if stops:
@@ -178,7 +176,7 @@ def drawbar_zero(
         why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
     if not stops or not abs(value) <= allowed:
         stops = _free_passes(windows, noise)
-        sentence = "mean over driving in which the drawbar force does not move; it assumes that nothing is towed there"
+        sentence = "mean over driving with a constant drawbar force; assumes that nothing is towed there"
         if not stops:
             return [], [Unknown(key, why)]
         value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
@@ -214,7 +212,7 @@ def inclination_zeros(
     no_pitch = Unknown(pitch_key, "there is no pitch")
     pitched = bool(np.isfinite(windows.pitch).any())
     if not np.isfinite(windows.acceleration).any():
-        why = "slope and zero of a pitch sensor read alike; it takes an accelerometer, or ground known to be level"
+        why = "a slope and a pitch sensor's zero look the same: give acceleration_x, or drive on ground known to be level"
         return [], [
             Unknown(bias_key, "there is no acceleration_x"),
             Unknown(pitch_key, why) if pitched else no_pitch,

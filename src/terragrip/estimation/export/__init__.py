@@ -80,11 +80,11 @@ def require_room(path: str | os.PathLike[str], rows: int, names: Collection[str]
     kind = require_suffix(path)
     missing = next((name for name in kind.needs if name not in names), None)
     if missing is not None:
-        problem = f"the log holds no {missing}, so {kind.title} has no places to show"
+        problem = f"the log has no {missing}, so {kind.title} would have no places to show"
         raise InputError(problem, file=path, hint="write .parquet, or name the positions in a profile")
     most = None if kind.most is None else kind.most(names)
     if most is not None and rows > most:
-        problem = f"{rows} rows are more than the {most} that {kind.title} takes"
+        problem = f"{rows} rows are more than {kind.title} can hold ({most})"
         raise InputError(problem, file=path, hint="write .parquet, or give a shorter part of the log")
 
 

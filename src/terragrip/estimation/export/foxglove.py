@@ -111,7 +111,7 @@ class McapFile:
         wrong = [float(when) for when in part.time[[0, -1]] if not 0 <= when + self._zero < _LATEST]
         if wrong:
             raise InputError(
-                f"a time of {wrong[0]:g} s cannot be a message's stamp",
+                f"a time of {wrong[0]:g} s cannot be the stamp of a message",
                 file=self._target, hint="check the unit of the log's time in a profile",
             )  # fmt: skip
         return round(1e9 * self._zero) + np.round(1e9 * part.time).astype(np.int64)

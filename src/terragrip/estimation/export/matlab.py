@@ -36,7 +36,7 @@ class MatFile:
         most = struct_rows(self._first.names)
         if self._rows > most:
             raise InputError(
-                f"the rows are more than the {most} that a MATLAB file takes",
+                f"a MATLAB file holds at most {most} rows",
                 file=self._target, hint="write .parquet (parquetread), or give a shorter part of the log",
             )  # fmt: skip
         for name, parts in self._parts.items():

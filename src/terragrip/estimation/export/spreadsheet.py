@@ -53,7 +53,7 @@ class Spreadsheet:
         """Write the rows of a part."""
         if self._row + len(part) > SHEET_ROWS:
             raise InputError(
-                f"the rows are more than the {SHEET_ROWS - 1} that an Excel sheet takes",
+                f"an Excel sheet holds at most {SHEET_ROWS - 1} rows",
                 file=self._target, hint="write .parquet, or give a shorter part of the log",
             )  # fmt: skip
         columns: list[Any] = [part[name].tolist() for name in self._names]

@@ -95,7 +95,7 @@ def _rows(index: Path) -> dict[str, tuple[Path | None, Path | None]]:
                 hint="write letters, digits and _ - . alone, as in its topic",
             )  # fmt: skip
         if name in result:
-            raise InputError(f"{name} stands here twice", file=index, place=place, hint="keep one row")
+            raise InputError(f"{name} occurs here twice", file=index, place=place, hint="keep one row")
         vehicle = index.parent / row["vehicle"] if row.get("vehicle") else None
         result[name] = vehicle, profile_in(index, row.get("profile", ""))
     if not result:
