@@ -118,12 +118,12 @@ def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, pla
 
 def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> None:
     """It changes its speed by .003 m/s²: a sixtieth of the time makes that no impossible one."""
-    time = np.arange(0, 1200, 0.05)
+    time = np.arange(0, 1200, 0.1)
     speed = 1.5 + 0.3 * np.sin(time / 100)
     draws = np.random.default_rng(1)
     columns = {"time": time / 60, "ground_speed": speed + 0.01 * draws.standard_normal(len(time))}
     columns |= {f"wheel_speed_{w}": speed / RADIUS + 0.01 * draws.standard_normal(len(time)) for w in WHEELS}
-    columns |= {"latitude": 51 + np.cumsum(speed) * 0.05 / 111_250, "longitude": np.full(len(time), 13.0)}
+    columns |= {"latitude": 51 + np.cumsum(speed) * 0.1 / 111_250, "longitude": np.full(len(time), 13.0)}
     (note,) = told(columns)
     assert re.match(
         r"The positions lie 1633 m apart, where ground and wheels drove 30\.07 m: time may not be in seconds",

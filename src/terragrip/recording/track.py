@@ -24,6 +24,8 @@ _SLOWEST = 0.3  # m/s: slower, a course is noise
 _VAGUE_TURN = 0.03  # rad/s, and
 _VAGUE_GRADE = 0.02  # rad: SDs above which no value is given
 _GRADE_WAY = 16.0  # m
+_BLOCK = 200_000
+"""Numbers of windows at once: the hour of a logger that counts minutes for seconds has windows of 2400 fixes, gigabytes together."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +85,15 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     span = max(5, int(window / max(median(np.diff(time)), 1e-6)) | 1)
     if len(rows) < span:
         return None
-    shown, half = np.lib.stride_tricks.sliding_window_view, span // 2
+    half = span // 2
     middle = slice(half, len(rows) - half)
-    ago = shown(time, span) - time[middle, None]
-    fits = [_fitted(ago, shown(x, span) - x[middle, None], 2) for x in (north, east)]
+    fits = [_fitted(time, x, np.arange(half, len(rows) - half), span, 2) for x in (north, east)]
     (_, vn, an), (_, ve, ae) = (result.T for result, _ in fits)
     an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
     speed = np.hypot(vn, ve)
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
-    reach = np.ptp(ago, axis=1)
+    reach = (time[2 * half :] - time[middle]) - (time[: len(rows) - 2 * half] - time[middle])
     gap = reach > 3 * max(window, median(reach))
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     altitude = _altitude(recording, time[middle])
@@ -108,8 +109,29 @@ def _altitude(recording: Recording, time: Floats) -> Floats:
     return np.interp(time, recording.time[known], altitude[known])
 
 
-def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Coefficients (n, 1 + degree) of polynomials through rows of (n, k), about 0, and their SDs from the scatter of the rows."""
+def _fitted(
+    at: Floats, values: Floats, rows: npt.NDArray[np.intp], span: int, degree: int
+) -> tuple[Floats, Floats]:
+    """Coefficients (n, 1 + degree) of polynomials through the `span` samples around each of rows (n,), about that sample, and their SDs
+    from the scatter of all."""
+    parts = [
+        _moments_solved(_around(at, some, span), _around(values, some, span), degree)
+        for some in np.array_split(rows, -(-len(rows) * span // _BLOCK))
+    ]
+    result, variance, square, scale = (np.concatenate(each) for each in zip(*parts, strict=True))
+    spread = np.sqrt(median(square) * variance)
+    return np.asarray(result / scale), np.asarray(spread / scale)
+
+
+def _around(values: Floats, rows: npt.NDArray[np.intp], span: int) -> Floats:
+    """The `span` values around each of rows (n,), less the one there: (n, span)."""
+    shown = np.lib.stride_tricks.sliding_window_view(values, span)
+    return np.asarray(shown[rows - span // 2] - values[rows, None])
+
+
+def _moments_solved(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of polynomials through rows of (n, k), in units of scale (n, 1 + degree): coefficients, their variances for an error of 1, the mean
+    square of what is left (n,), and scale."""
     size = np.maximum(np.abs(ago).max(axis=1, keepdims=True), 1e-9)
     place, powers = np.arange(degree + 1), [np.ones_like(ago)]
     for _ in range(2 * degree):
@@ -121,9 +143,7 @@ def _fitted(ago: Floats, values: Floats, degree: int) -> tuple[Floats, Floats]:
     freedom = ago.shape[1] - degree - 1
     left = values - sum(result[:, k, None] * powers[k] for k in place)
     square = np.sum(left**2, axis=1) / freedom
-    spread = np.sqrt(median(square) * np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2))
-    scale = size**place
-    return np.asarray(result / scale), np.asarray(spread / scale)
+    return result, np.diagonal(np.linalg.inv(normal), axis1=1, axis2=2), square, size**place
 
 
 def _grade(time: Floats, speed: Floats, height: Floats) -> Floats:
@@ -136,11 +156,12 @@ def _grade(time: Floats, speed: Floats, height: Floats) -> Floats:
     span = max(7, int(_GRADE_WAY / max(step, 1e-6)) | 1)
     if len(way) < span:
         return unknown
-    shown, middle = np.lib.stride_tricks.sliding_window_view, slice(span // 2, len(way) - span // 2)
-    ago = shown(way, span) - way[middle, None]
-    long = np.minimum(-ago[:, 0], ago[:, -1]) > _GRADE_WAY / 4  # else the vehicle stood, and altitude drifted
-    if not long.any():
+    half = span // 2
+    rows = np.arange(half, len(way) - half)
+    behind, ahead = way[rows] - way[rows - half], way[rows + half] - way[rows]
+    rows = rows[np.minimum(behind, ahead) > _GRADE_WAY / 4]  # else the vehicle stood, and altitude drifted
+    if not rows.size:
         return unknown
-    rise, spread = _fitted(ago[long], (shown(height, span) - height[middle, None])[long], 3)
-    unknown[middle][long] = np.where(spread[:, 1] < _VAGUE_GRADE, np.arctan(rise[:, 1]), np.nan)
+    rise, spread = _fitted(way, height, rows, span, 3)
+    unknown[rows] = np.where(spread[:, 1] < _VAGUE_GRADE, np.arctan(rise[:, 1]), np.nan)
     return unknown
