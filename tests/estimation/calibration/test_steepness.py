@@ -21,7 +21,7 @@ def curves(
     slip = rng.uniform(0.005, 0.08, N)
     level = TOP * -np.expm1(-RATE * slip)
     measured = slip + shift * (1 - slip) + noise * rng.standard_normal(N)
-    return steepness_of(level, measured, SOIL, known, np.arange(N) // 4), TOP * RATE * np.exp(-RATE * slip)
+    return steepness_of(level, measured, SOIL, known, np.arange(N) // 4, np.zeros(N)), TOP * RATE * np.exp(-RATE * slip)
 
 
 @pytest.mark.parametrize(
@@ -39,6 +39,23 @@ def test_neither_noise_nor_a_wrong_radius_flattens_the_curve(
 def test_a_radius_that_nobody_knows_leaves_the_steepness_open() -> None:
     sure, unsure = curves(0.03)[0].relative_std, curves(0.03, known=0.05)[0].relative_std
     assert 0.0 < sure < unsure < 1.0
+
+
+def test_a_late_ground_speed_does_not_bend_the_curve() -> None:
+    """A machine that speeds up pulls more; .1 s late, its slips look like a curve a third flatter."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        slip = rng.uniform(0.005, 0.08, N)
+        level = TOP * -np.expm1(-RATE * slip)
+        rate = 3 * (level - level.mean()) + 0.2 * rng.standard_normal(N)
+        measured = slip + 0.1 * rate + 0.01 * rng.standard_normal(N)
+        true = np.mean(TOP * RATE * np.exp(-RATE * slip))
+        taken, ignored = (
+            np.mean(steepness_of(level, measured, SOIL, 0.005, np.arange(N) // 4, by).steepness) / true
+            for by in (rate, np.zeros(N))
+        )
+        assert abs(taken - 1) < 0.35
+        assert ignored < 0.7
 
 
 def test_gains_of_axles_that_slip_unlike_hold_with_a_radius_that_is_wrong_on_all() -> None:

@@ -196,6 +196,7 @@ def _rows(
         radius_std=vehicle.uncertainty.wheel_radius or _RADIUS,
         offset_std=np.maximum(offset_std[driven], _LEAST_OFFSET),
         slip_std=radius_std,
+        by_delay=np.mean((table.wheel_acceleration / table.wheel_speed)[:, driven], axis=1),
     )
 
 

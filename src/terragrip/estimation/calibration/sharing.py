@@ -9,8 +9,9 @@ m_n is the adhesion that all wheels have at the window's mean slip s_n, an unkno
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
 for its steepness d_n, which carries the wheels' small differences of slip
 (:mod:`~terragrip.estimation.calibration.steepness`). Unknown are ln k_i (mean 0: a gain common to all
-wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i and the offsets o_i. Weighted least squares
-with Huber weights; (R), our own construction.
+wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i (mean 0, likewise) and the offsets o_i. A larger
+radius is a longer lever, too: what is solved for in place of k_i is k_i (1 + e_i). Weighted least squares with Huber weights; (R), our
+own construction.
 
 Adhesion differs from place to place, so the errors of neighbouring windows are correlated: the covariance is the sandwich
 over blocks of track.
@@ -42,7 +43,7 @@ class Sharing:
 
     ``torque`` N m; ``known`` the part B without adhesion, N m; ``leverage`` r F, N m; ``slip``; ``soil`` (n,) and
     ``block`` (n,) integer labels from 0. ``radius_std`` of each wheel's relative radius, ``offset_std`` (w,) N m: the priors; ``slip_std``
-    of an error that all slips share.
+    of an error that all slips share. ``by_delay`` (n,) 1/s: what a ground speed that is late by a second adds to the slips (None: nothing).
     """
 
     torque: Floats
@@ -54,6 +55,7 @@ class Sharing:
     radius_std: float
     offset_std: Floats
     slip_std: float = 0.0
+    by_delay: Floats | None = None
 
     def select(self, rows: Bools) -> Sharing:
         """The windows of a mask (n,)."""
@@ -65,6 +67,7 @@ class Sharing:
             slip=self.slip[rows],
             soil=self.soil[rows],
             block=self.block[rows],
+            by_delay=None if self.by_delay is None else self.by_delay[rows],
         )
 
 
@@ -112,15 +115,15 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
     # Neighbouring windows repeat each other: weigh the priors against the data's true information.
     scale = max(1.0, float(np.trace(clustered[:w, :w]) / np.trace(naive[:w, :w])))
     values = problem.solve(values, scale)
-    # A radius error that all wheels have leaves no trace here: report the differences.
+    # A radius error that all wheels have leaves no trace here: report the differences. A larger radius is a longer lever, too.
     apart = np.eye(w) - 1 / w
-    center = np.block([[np.eye(w), np.zeros((w, w))], [np.zeros((w, w)), apart]])
+    center = np.block([[np.eye(w), -apart], [np.zeros((w, w)), apart]])
     covariance = problem.covariance(values, scale, data.block)[: 2 * w, : 2 * w]
     alone = problem.covariance(values, scale, data.block, lasting=False)[:w, :w]
     found = SharedGains(
-        log_gain=values[:w],
+        log_gain=values[:w] - apart @ values[w : 2 * w],
         radius=apart @ values[w : 2 * w],
-        covariance=center @ covariance @ center,
+        covariance=center @ covariance @ center.T,
         windows=len(data.torque),
         blocks=len(np.unique(data.block)),
         load_sensitivity=center @ problem.load_sensitivity(values, scale),
@@ -178,7 +181,10 @@ class _Problem:
         """d_n of the curves as the levels show them."""
         level, _, _ = self._levels(values)
         data = self.data
-        curves = steepness_of(level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, self.form)
+        by_delay = np.zeros(len(level)) if data.by_delay is None else data.by_delay
+        curves = steepness_of(
+            level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, by_delay, self.form
+        )
         steepness = self.stretch * curves.steepness
         return replace(self, steepness=steepness, steepness_std=curves.relative_std, chance=curves.chance)
 
@@ -224,8 +230,9 @@ class _Problem:
         variance = float(np.sum(weight * scaled**2) / np.sum(weight)) * w / (w - 1)
         flat = jacobian.reshape(-1, 3 * w)
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
-        # The mean of ln k is 0: a row of certainty.
-        normal[:w, :w] += 1e6 * float(np.max(np.diag(normal)[:w]))
+        # The means of ln k and of e are 0, since m_n takes up what is common: rows of certainty.
+        for own in (slice(w), slice(w, 2 * w)):
+            normal[own, own] += 1e6 * float(np.max(np.diag(normal)[own]))
         return _Fit(jacobian, scaled, weight, normal, variance)
 
     def step(self, values: Floats, scale: float) -> Floats:
@@ -234,7 +241,8 @@ class _Problem:
         gradient = np.einsum("nwp,nw->p", fit.jacobian, fit.weight * fit.residual)
         gradient -= fit.variance * scale * self.prior @ values
         move = _inverse(fit.normal) @ gradient
-        move[:w] -= np.mean(values[:w] + move[:w])
+        for own in (slice(w), slice(w, 2 * w)):
+            move[own] -= np.mean(values[own] + move[own])
         return np.asarray(move)
 
     def solve(self, values: Floats, scale: float) -> Floats:

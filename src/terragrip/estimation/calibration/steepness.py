@@ -3,9 +3,10 @@
 A window's slip has the ground speed's noise, its adhesion little, so slip is regressed on adhesion: the other way round noise would
 flatten the curve (as in :mod:`~terragrip.estimation.calibration.radii`). With m = A (1 - exp(-C s/A))::
 
-    s_n = s_0 + x_j f(m_n),   f(m) = -A ln(1 - m/A),   x_j = 1/C_j of soil j,   dm/ds = C_j (1 - m/A)
+    s_n = s_0 + τ a_n + x_j f(m_n),   f(m) = -A ln(1 - m/A),   x_j = 1/C_j of soil j,   dm/ds = C_j (1 - m/A)
 
-s_0 is what an error of all radii adds to every slip: without it light work on firm ground would look as flat as mud. (R), our own
+τ is the ground speed's delay and a_n the relative rate of the rims: a machine that speeds up pulls more, so a late ground speed
+would bend the curve. s_0 is what an error of all radii adds to every slip: without it light work on firm ground would look as flat as mud. (R), our own
 construction.
 """
 
@@ -22,6 +23,7 @@ _LEAST, _MOST = 0.025, 1.0  # x
 _ROOM = np.array([1.02, 1.04, 1.06, 1.1, 1.3, 1.6, 2.0, 3.0, 5.0])  # A over the largest level of a soil
 _TOP = 0.98  # quantile that stands for the largest
 _LEAST_LEVEL = 0.05
+_DELAY = 0.1  # s, SD of the ground speed's delay
 _ROUNDS = 10
 _HUBER = 2.0
 
@@ -36,11 +38,17 @@ class Steepness:
 
 
 def steepness_of(
-    level: Floats, slip: Floats, soil: Ints, slip_std: float, block: Ints, form: int | None = None
+    level: Floats,
+    slip: Floats,
+    soil: Ints,
+    slip_std: float,
+    block: Ints,
+    by_delay: Floats,
+    form: int | None = None,
 ) -> Steepness:
     """The curves' steepness at levels (n,) of slips (n,); ``soil`` and ``block`` (n,) labels from 0.
 
-    ``slip_std``: of an error that all slips share. Neighbouring windows repeat each other, so a stretch of track counts as one.
+    ``slip_std``: of an error that all slips share; ``by_delay`` (n,) 1/s: what a second's delay adds to each. Neighbouring windows repeat each other, so a stretch of track counts as one.
     ``form``: the place in `_ROOM` of the one to take; None: the one that fits best.
     """
     size, signed = np.abs(level), np.where(level < 0, -slip, slip)
@@ -49,8 +57,10 @@ def steepness_of(
     repeats = len(level) / len(np.unique(block))
     ceiling = _ROOM[:, None] * np.maximum(top, _LEAST_LEVEL)[soil]
     share = np.minimum(size / ceiling, 0.98)
+    sign = np.where(level < 0, -1.0, 1.0)
+    common = np.column_stack([sign, sign * by_delay])
     losses, inverse, deviation = _regressed(
-        -ceiling * np.log1p(-share), signed, soil, np.sign(level), slip_std, repeats
+        -ceiling * np.log1p(-share), signed, soil, common, np.array([slip_std, _DELAY]), repeats
     )
     fits = len(np.unique(block)) * np.log(np.maximum(losses, 1e-9))
     chance = np.exp(np.min(fits) - fits)
@@ -60,16 +70,16 @@ def steepness_of(
 
 
 def _regressed(
-    form: Floats, slip: Floats, soil: Ints, sign: Floats, slip_std: float, repeats: float
+    form: Floats, slip: Floats, soil: Ints, common: Floats, common_std: Floats, repeats: float
 ) -> tuple[Floats, Floats, Floats]:
-    """For forms (m, n) of the levels: the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means."""
+    """For forms (m, n) of the levels and terms (n, k) that all share, of SDs (k,): the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means."""
     soils = int(soil.max()) + 1
-    design = np.zeros((*form.shape, soils + 1))
+    design = np.zeros((*form.shape, soils + common.shape[1]))
     design[:, np.arange(len(slip)), soil] = form
-    design[..., -1] = sign
+    design[..., soils:] = common
     turned = np.ascontiguousarray(np.swapaxes(design, 1, 2))
-    center = np.r_[np.full(soils, _PRIOR[0]), 0.0]
-    precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), max(slip_std, 1e-6) ** -2.0]
+    center = np.r_[np.full(soils, _PRIOR[0]), np.zeros(common.shape[1])]
+    precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), np.maximum(common_std, 1e-6) ** -2.0]
     values = np.tile(center, (len(form), 1))
     for _ in range(_ROUNDS):
         rest = np.abs(slip - _times(design, values))
@@ -77,11 +87,11 @@ def _regressed(
         weight = np.minimum(1.0, _HUBER * noise / np.maximum(rest, 1e-12)) / (noise**2 * repeats)
         covariance = np.linalg.inv((turned * weight[:, None, :]) @ design + np.diag(precision))
         values = _times(covariance, _times(turned, weight * slip) + precision * center)
-    inverse = np.clip(values[:, :-1], _LEAST, _MOST)
+    inverse = np.clip(values[:, :soils], _LEAST, _MOST)
     counts = np.bincount(soil, minlength=soils) / len(soil)
-    bounded = np.column_stack([inverse, values[:, -1]])
+    bounded = np.column_stack([inverse, values[:, soils:]])
     loss = np.mean(np.abs(slip - _times(design, bounded)), axis=1)
-    spread = np.sqrt(counts @ covariance[:, :-1, :-1] @ counts)
+    spread = np.sqrt(counts @ covariance[:, :soils, :soils] @ counts)
     return loss, inverse, spread / (inverse @ counts)
 
 
