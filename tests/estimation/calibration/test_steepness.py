@@ -21,7 +21,9 @@ def curves(
     slip = rng.uniform(0.005, 0.08, N)
     level = TOP * -np.expm1(-RATE * slip)
     measured = slip + shift * (1 - slip) + noise * rng.standard_normal(N)
-    return steepness_of(level, measured, SOIL, known, np.arange(N) // 4, np.zeros(N)), TOP * RATE * np.exp(-RATE * slip)
+    return steepness_of(level, measured, SOIL, known, np.arange(N) // 4, np.zeros(N)), TOP * RATE * np.exp(
+        -RATE * slip
+    )
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,10 @@ _STEEPNESS = (
 _LEVEL = (0.6, 0.6)  # prior of A: mean, and standard deviation of ln A
 _LEAST_PULL = 0.15
 _DELAY = 0.1  # s, SD of the ground speed's delay: while a machine speeds up it pulls more, so a delay would pass for slip
+_WANDERS = 0.2  # s, by which it may differ from window to window: a receiver's interval, and rates are of four seconds
+_SOILS = 0.35  # SD of ln C from one stretch without a label to the next,
+_STRETCH, _STRETCHES = 20.0, 40  # m that it lasts at least, and how many there are at most
+_LEAST_ADHESION = 0.01
 _ROUNDS = 50
 _TORQUE_ZERO = 0.02  # prior of a torque zero, over r F, where the vehicle states none
 _ROLLING = 0.15  # adhesion and rolling resistance at zero pull: what a gain error acts on
@@ -172,6 +176,8 @@ def _fit(
 ) -> tuple[Floats, Floats, Floats, float]:
     """Least squares for the radii over the file's, ln C_j, ln A_j and the ground speed's delay; the variance is over blocks of track.
 
+    Without a label a stretch's slips err together: soft soil asks for more thrust and slips more, so that slip over adhesion between soils
+    is no soil's curve.
     Returns the scale (w,), the variance (w,) of its logarithm, C (soils,), and how many blocks the radii rest on.
     """
     w, soils = len(vehicle.wheels), len(most)
@@ -189,13 +195,13 @@ def _fit(
     ]
     rates = np.mean(windows.wheel_acceleration * vehicle.wheel_radius, axis=1)[:, None]
     by_delay = np.where(used & np.isfinite(rates), -rates / np.where(used, windows.hub_speed, 1.0), 0.0)
-    values = center.copy()
+    stretch = _stretches(windows)
+    offset_std = _SOILS / np.exp(steep) * _typical(np.abs(pull).mean(axis=1), np.any(used, axis=1), stretch)
+    values, offset = center.copy(), np.zeros(len(offset_std))
     for _ in range(_ROUNDS):
         steepness = np.exp(values[count : count + soils])[code][:, None]
         level = np.exp(values[count + soils : -1])[code][:, None]
-        share = np.clip(pull / level, -0.95, 0.95)
-        slip = -level / steepness * np.log1p(-share)
-        bend = -level / steepness * (np.log1p(-share) + share / (1 - share))  # d slip / d ln A
+        slip, bend = _slip_at(pull, steepness, level)
         jacobian = np.zeros((*ratio.shape, len(values)))
         jacobian[:, np.arange(w), group] = 1.0
         jacobian[:, :, -1] = by_delay
@@ -204,19 +210,21 @@ def _fit(
             jacobian[:, :, count + j] = np.where(own, slip / (1 - slip), 0.0)
             jacobian[:, :, count + soils + j] = np.where(own, -bend / (1 - slip), 0.0)
         residual = ratio - values[group] - values[-1] * by_delay - np.log1p(-np.minimum(slip, 0.9))
-        noise = 1.4826 * float(np.median(np.abs(residual[used])))
-        spreads = np.hypot(max(noise, 1e-6), 0.1 * slip)  # local adhesion shifts slip in proportion
-        scaled = np.where(used, residual / spreads, 0.0)
-        weight = np.where(used, np.minimum(1.0, 2.5 / np.maximum(np.abs(scaled), 1e-12)), 0.0)
-        flat = np.where(used[..., None], jacobian / spreads[..., None], 0.0).reshape(-1, len(values))
-        normal = flat.T @ (flat * weight.reshape(-1, 1)) + np.diag(prior)
-        step = np.linalg.solve(normal, flat.T @ (weight * scaled).ravel() - prior * (values - center))
+        noise = 1.4826 * float(np.median(np.abs(residual - offset[stretch][:, None])[used]))
+        # Local adhesion shifts slip in proportion.
+        spreads = np.sqrt(max(noise, 1e-6) ** 2 + (0.1 * slip) ** 2 + (_WANDERS * by_delay) ** 2)
+        apart = np.abs(residual - offset[stretch][:, None]) / spreads
+        root = np.where(used, np.sqrt(np.minimum(1.0, 2.5 / np.maximum(apart, 1e-12))), 0.0) / spreads
+        rows = root[..., None] * np.concatenate([jacobian, residual[..., None]], axis=2)
+        rows, offset = _less_offsets(rows, root, stretch, offset_std)
+        flat, rest = rows[..., :-1].reshape(-1, len(values)), rows[..., -1]
+        normal = flat.T @ flat + np.diag(prior)
+        step = np.linalg.solve(normal, flat.T @ rest.ravel() - prior * (values - center))
         values = values + np.clip(step, -1.0, 1.0)
         if np.max(np.abs(step)) < 1e-10:
             break
-    rows = flat.reshape(len(block), w, -1)
-    score = np.einsum("nwp,nw->np", rows, weight * scaled)
-    rooted = rows * np.sqrt(weight)[..., None]
+    rooted = rows[..., :-1]
+    score = np.einsum("nwp,nw->np", rooted, rest)
     informed = np.any(used, axis=1)
     # The scatter of few blocks may be too small by chance; that of single windows is a lower bound.
     variance = np.max(
@@ -228,6 +236,45 @@ def _fit(
     )
     held = min(effective_blocks(normal, rooted[informed], block[informed], k) for k in range(count))
     return np.exp(values[group]), variance[group], np.exp(values[count : count + soils]), held
+
+
+def _slip_at(pull: Floats, steepness: Floats, level: Floats) -> tuple[Floats, Floats]:
+    """The curve's slip at adhesions, and d slip / d ln A, all (n, w)."""
+    share = np.clip(pull / level, -0.95, 0.95)
+    slip = -level / steepness * np.log1p(-share)
+    return slip, -level / steepness * (np.log1p(-share) + share / (1 - share))
+
+
+def _stretches(windows: Windows) -> Ints:
+    """The stretch of track of each window (n,), from 1; 0 where it has a label."""
+    way = np.maximum.accumulate(np.nan_to_num(windows.position[:, 0]))
+    length = max(_STRETCH, float(way.max(initial=0.0)) / _STRETCHES)
+    names = windows.recording * (1 + int(way.max(initial=0.0) / length)) + (way / length).astype(np.intp)
+    bare = windows.soil == ""
+    result = np.zeros(len(way), dtype=np.intp)
+    result[bare] = 1 + np.unique(names[bare], return_inverse=True)[1]
+    return result
+
+
+def _typical(size: Floats, used: Bools, stretch: Ints) -> Floats:
+    """The median adhesion of the used windows of each stretch; 0 for the labelled, whose slips do not err together."""
+    result = np.zeros(int(stretch.max(initial=0)) + 1)
+    for label in np.unique(stretch[used & (stretch > 0)]):
+        result[label] = max(_LEAST_ADHESION, float(np.median(size[used & (stretch == label)])))
+    return result
+
+
+def _less_offsets(rows: Floats, effect: Floats, stretch: Ints, std: Floats) -> tuple[Floats, Floats]:
+    """Rows (n, w, k) whitened for an offset of SD std (m,) that a stretch's share, and the last column's offsets (m,).
+
+    ``effect`` (n, w) is what an offset of 1 adds to a row: I + σ² u uᵀ has the inverse root I - (1 - 1/√(1 + σ²|u|²)) u uᵀ/|u|².
+    """
+    power, along = np.zeros(len(std)), np.zeros((len(std), rows.shape[2]))
+    np.add.at(power, stretch, np.sum(effect**2, axis=1))
+    np.add.at(along, stretch, np.einsum("nw,nwk->nk", effect, rows))
+    share = std**2 * power
+    taken = along * ((1 - 1 / np.sqrt(1 + share)) / np.maximum(power, 1e-300))[:, None]
+    return rows - effect[..., None] * taken[stretch][:, None, :], std**2 * along[:, -1] / (1 + share)
 
 
 def _considered(vehicle: Vehicle, steepness: float) -> Floats:

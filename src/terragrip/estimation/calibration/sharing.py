@@ -231,8 +231,8 @@ class _Problem:
         flat = jacobian.reshape(-1, 3 * w)
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
         # The means of ln k and of e are 0, since m_n takes up what is common: rows of certainty.
-        for own in (slice(w), slice(w, 2 * w)):
-            normal[own, own] += 1e6 * float(np.max(np.diag(normal)[own]))
+        for part in (slice(w), slice(w, 2 * w)):
+            normal[part, part] += 1e6 * float(np.max(np.diag(normal)[part]))
         return _Fit(jacobian, scaled, weight, normal, variance)
 
     def step(self, values: Floats, scale: float) -> Floats:
@@ -241,8 +241,8 @@ class _Problem:
         gradient = np.einsum("nwp,nw->p", fit.jacobian, fit.weight * fit.residual)
         gradient -= fit.variance * scale * self.prior @ values
         move = _inverse(fit.normal) @ gradient
-        for own in (slice(w), slice(w, 2 * w)):
-            move[own] -= np.mean(values[own] + move[own])
+        for part in (slice(w), slice(w, 2 * w)):
+            move[part] -= np.mean(values[part] + move[part])
         return np.asarray(move)
 
     def solve(self, values: Floats, scale: float) -> Floats:

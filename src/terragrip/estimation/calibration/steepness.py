@@ -6,8 +6,8 @@ flatten the curve (as in :mod:`~terragrip.estimation.calibration.radii`). With m
     s_n = s_0 + τ a_n + x_j f(m_n),   f(m) = -A ln(1 - m/A),   x_j = 1/C_j of soil j,   dm/ds = C_j (1 - m/A)
 
 τ is the ground speed's delay and a_n the relative rate of the rims: a machine that speeds up pulls more, so a late ground speed
-would bend the curve. s_0 is what an error of all radii adds to every slip: without it light work on firm ground would look as flat as mud. (R), our own
-construction.
+would bend the curve. s_0 is what an error of all radii adds to every slip: without it light work on firm ground would look as flat as
+mud. (R), our own construction.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def steepness_of(
 ) -> Steepness:
     """The curves' steepness at levels (n,) of slips (n,); ``soil`` and ``block`` (n,) labels from 0.
 
-    ``slip_std``: of an error that all slips share; ``by_delay`` (n,) 1/s: what a second's delay adds to each. Neighbouring windows repeat each other, so a stretch of track counts as one.
+    ``slip_std``: of an error that all slips share; ``by_delay`` (n,) 1/s: what a second's delay adds to each. Neighbouring windows repeat
+    each other, so a stretch of track counts as one.
     ``form``: the place in `_ROOM` of the one to take; None: the one that fits best.
     """
     size, signed = np.abs(level), np.where(level < 0, -slip, slip)
@@ -72,7 +73,10 @@ def steepness_of(
 def _regressed(
     form: Floats, slip: Floats, soil: Ints, common: Floats, common_std: Floats, repeats: float
 ) -> tuple[Floats, Floats, Floats]:
-    """For forms (m, n) of the levels and terms (n, k) that all share, of SDs (k,): the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means."""
+    """For forms (m, n) of the levels and terms (n, k) that all share, of SDs (k,).
+
+    Returns the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means.
+    """
     soils = int(soil.max()) + 1
     design = np.zeros((*form.shape, soils + common.shape[1]))
     design[:, np.arange(len(slip)), soil] = form
