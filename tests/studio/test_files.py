@@ -38,14 +38,16 @@ def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
         ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "no picture that the studio takes"),
         ("bad.yaml", b"axles: {front: {mass: -1 kg}}", ""),
         ("soils.json", b"{}", "exists already"),
-        ("bomb.csv.gz", gzip.compress(b"time,ground_speed\n" + b"1,1\n" * 15_000_000), "unpacks to more than 34 MB"),
+        ("bomb.csv.gz", None, "unpacks to more than 34 MB"),
         ("lib.json", b'{"soils": {"x": {"model": "none"}}}', "not known"),
         ("no/such/folder.csv", b"a,b\n1,2\n", "cannot be written there"),
     ],
 )  # fmt: skip
 def test_what_is_not_what_its_name_says_is_refused_and_leaves_nothing(
-    client: TestClient, folder: Path, path: str, content: bytes, why: str
+    client: TestClient, folder: Path, path: str, content: bytes | None, why: str
 ) -> None:
+    if content is None:  # not while every worker imports this file
+        content = gzip.compress(b"time,ground_speed\n" + b"1,1\n" * 15_000_000)
     before = {p: p.read_bytes() for p in folder.iterdir()}
     status, detail = put(client, path, content)
     assert status == 422
