@@ -230,11 +230,11 @@ def test_right_clocks_stay_and_wrong_ones_are_set_right(tmp_path: Path, seed: in
     right = tg.read([first, second])
     assert len(right) == len(TIME)  # not moved, so that stamps still coincide
     (note,) = [note for note in right.notes if "clock of gnss.csv" in note]
-    assert note.endswith("so it is taken as it is.")
+    assert note.endswith("so it is used as it is.")
     put(second, ground.assign(time=TIME + 0.4))
     late = tg.read([first, second])
     (note,) = [note for note in late.notes if "clock of gnss.csv" in note]
-    assert note.endswith("and was set right.")
+    assert note.endswith("and was shifted by that.")
     fresh = np.isfinite(late["ground_speed"])
     assert np.abs(late.time[fresh][0]) < 0.1
 

@@ -81,7 +81,7 @@ def _shift(reference: Part, part: Part) -> tuple[float, str]:
         result = lag_between(mine, replace(theirs, time=theirs.time - stated), reach=reach)
     if result is None:
         how = "counts from 1970 as the first does" if reach is not None else "starts with the first one"
-        return stated, f"The clock of {name} is taken as it is (it {how}): the speeds do not tell an offset."
+        return stated, f"The clock of {name} is used as it is (it {how}): the speeds show no offset."
     side = "ahead of" if result.seconds >= 0 else "behind"
     beyond = "its stamps" if reach is not None else "its start"
     sentence = (
@@ -89,5 +89,5 @@ def _shift(reference: Part, part: Part) -> tuple[float, str]:
         f"correlation of the speeds ({result.correlation:.3f})"
     )
     if not result.is_of_the_clock:
-        return stated, f"{sentence}; {result.why_not}, so it is taken as it is."
-    return stated + result.seconds, f"{sentence}, and was set right."
+        return stated, f"{sentence}; {result.why_not}, so it is used as it is."
+    return stated + result.seconds, f"{sentence}, and was shifted by that."
