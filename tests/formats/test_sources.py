@@ -111,3 +111,14 @@ def test_tables_that_start_together_without_a_profile(tmp_path: Path) -> None:
         tg.read([tmp_path / "a.csv"], ["tractor-isobus", "simulink"])
     with pytest.raises(InputError, match="there is no log"):
         tg.read([])
+
+
+def test_a_file_that_goes_on_where_another_ends_is_refused(tmp_path: Path) -> None:
+    """Both have the same channels: the second one's rows would be left out without a word."""
+    time = np.arange(0, 100, 0.1)
+    drive = pd.DataFrame({"time": time, "ground_speed": speed_at(time), "wheel_speed_l": 5 * speed_at(time)})
+    drive[:600].to_csv(tmp_path / "1.csv", index=False)
+    drive[500:].to_csv(tmp_path / "2.csv", index=False)
+    with pytest.raises(InputError, match=r"2\.csv: has no channel that the logs before it lack") as caught:
+        tg.read([tmp_path / "1.csv", tmp_path / "2.csv"])
+    assert "made one file first" in str(caught.value)

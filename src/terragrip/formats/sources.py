@@ -43,6 +43,13 @@ def joined(
                 "holds no channel", file=part.source, hint="leave it out, or name its columns in a profile"
             )
         shift = 0.0
+        if part.columns.keys() <= signals.keys():
+            # Taken as it is, its rows would vanish without a word: a drive cut into files is the usual cause.
+            raise InputError(
+                "has no channel that the logs before it lack, so nothing of it would be used",
+                file=part.source,
+                hint="logs that follow each other are estimated each by itself, or made one file first",
+            )
         if number:
             notes += part.notes
             shift, remarks = _shift(reference, part)
