@@ -18,6 +18,7 @@ from terragrip.errors import InputError
 from terragrip.formats import inspect, read
 from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
+from terragrip.vehicle_maker import make
 
 TIME = np.arange(0.0, 60.0, 0.1)
 SPEED = 3.0 + np.sin(TIME / 5)  # m/s
@@ -105,6 +106,19 @@ def test_what_is_of_a_motor_asks_for_the_gear_ratio(
             assert proposal.entry["scale"] == 1.0
         assert any("0.0117 m a radian" in words for words in found.proposals[f"wheel_speed_{wheel}"].evidence)
     assert found.to_text().count("gear ratio") >= 8
+    unknown = [line for line in found.profile.splitlines() if "scale: 1.0" in line]
+    assert len(unknown) == 8
+    assert all("# ? " in line for line in unknown)  # no scale of ours passes for a value that was found
+
+
+def test_a_proposed_profile_fits_a_new_vehicle_with_a_wheel_a_side(tmp_path: Path) -> None:
+    sides = {
+        f"{side}_wheel_{what}": SPEED / 0.2 for side in ("left", "right") for what in ("rad_s", "torque_Nm")
+    }
+    pd.DataFrame({"t [s]": TIME, "v_gps [m/s]": SPEED, **sides}).to_csv(tmp_path / "log.csv", index=False)
+    found = inspect(tmp_path / "log.csv").proposals
+    wheels = make("skid-steer").vehicle.wheels
+    assert {f"{what}_{wheel}" for wheel in wheels for what in ("wheel_speed", "drive_torque")} <= set(found)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def summary_of(inspections: Sequence[Inspection]) -> str:
 
 def _proposal_text(channel: str, proposal: Proposal) -> str:
     """A proposal on one line: where from, how sure, why, what else it might be."""
-    mark = "? " * bool(proposal.doubt)
+    mark = "? " * proposal.is_doubtful
     unit = f" [{proposal.unit}]" if proposal.unit else ""
     why = "; ".join(
         [

@@ -81,7 +81,7 @@ def profile_text(
     dbc: Sequence[str | os.PathLike[str]] = (),
     head: str = "Proposed by 'terragrip inspect' for {}. Check every line; '?' marks a doubt.",
 ) -> str:
-    """A profile as YAML: loads as it stands, with a question mark at every line that was guessed; ``head`` is its first line."""
+    """A profile as YAML: loads as it stands, with a question mark where a line was guessed or lacks a number; ``head``: its first line."""
     lines = [f"# {head.format(file)}"]
     if stamp is None:
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
@@ -94,10 +94,8 @@ def profile_text(
     lines.append("channels:" if proposals else "channels: {}")
     for channel in sorted(proposals, key=_order):
         proposal = proposals[channel]
-        remarks = [f"? {proposal.doubt}"] * bool(proposal.doubt) + [proposal.give] * bool(proposal.give)
-        lines.append(
-            f"  {channel}: {_flow(proposal.entry)}" + (f"   # {'; '.join(remarks)}" if remarks else "")
-        )
+        remarks = "; ".join(filter(None, (proposal.doubt, proposal.give)))
+        lines.append(f"  {channel}: {_flow(proposal.entry)}" + f"   # ? {remarks}" * proposal.is_doubtful)
     if not wheel_names_in(proposals) and "wheel_based_speed" not in proposals:
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:

@@ -34,7 +34,7 @@ SURE = 0.7
 class Proposal:
     """What a channel may be made of: the keys of its entry in a profile, and what to look at.
 
-    ``doubt`` is why it carries a question mark (empty: none), ``give`` what only the user can add (a gear ratio, a torque constant),
+    ``doubt`` is what was guessed (empty: nothing), ``give`` what only the user can add (a gear ratio, a torque constant),
     ``confidence`` (0 to 1) how well name and data agree, ``evidence`` what speaks for it, ``others`` proposals of other columns, best
     first, ``unit`` the column's own unit, as far as it is known.
     """
@@ -46,6 +46,11 @@ class Proposal:
     evidence: tuple[str, ...] = ()
     others: tuple[Proposal, ...] = ()
     unit: str | None = None
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether its line carries a question mark: it is guessed, or holds a number that only the user can know."""
+        return bool(self.doubt or self.give)
 
     @property
     def alternatives(self) -> tuple[str, ...]:
@@ -171,6 +176,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
     entry: dict[str, object] = {"from": guess.column.column}
     target = unit_of(channel)
     unit, give = guess.unit, ""
+    told: tuple[str, ...] = ()
     kind = kind_of(unit)
     if channel.startswith("drive_torque_") and kind in ("current", None) and guess.column.name.has("current"):
         entry |= {"scale": 1.0, "unit": "N m"} if guess.column.unit else {"scale": 1.0}
@@ -179,14 +185,17 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
     elif channel.startswith("wheel_speed_") and kind == "speed" and unit is not None:
         radius = radius_of(vehicle, channel.removeprefix("wheel_speed_"))
         entry |= {"scale": float(f"{factor_to(unit, 'm/s') / (radius or 1.0):.6g}"), "unit": "rad/s"}
-        give = (
-            f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
-            if radius is None
-            else f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m"
-        )
+        if radius is None:
+            give = f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
+        else:
+            told = (f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m",)
     elif unit and target and (unit != target or guess.column.stated not in (None, unit)):
         entry["unit"] = unit
-    if guess.column.name.has("motor") and not give and channel.startswith(("wheel_speed_", "drive_torque_")):
+    if (
+        guess.column.name.has("motor")
+        and not (give or told)
+        and channel.startswith(("wheel_speed_", "drive_torque_"))
+    ):
         entry |= {"scale": 1.0} | ({"unit": unit} if unit and unit != target else {})
         turns = "wheel turns per motor turn" if channel.startswith("wheel") else "motor turns per wheel turn"
         give = f"motor side, needs the gear ratio: the scale is {turns}"
@@ -197,7 +206,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         doubt,
         give,
         round(guess.confidence, 2),
-        guess.evidence,
+        (*guess.evidence, *told),
         tuple(_proposal(channel, g, [], vehicle) for g in others[:3]),
         unit or None,
     )
