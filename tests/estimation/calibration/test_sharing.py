@@ -105,3 +105,16 @@ def test_what_all_radii_share_is_no_unknown() -> None:
     level = problem._levels(values)[0]
     truth = LEVEL[problem.data.soil] * -np.expm1(-10 * problem.data.slip.mean(axis=1))
     np.testing.assert_allclose(level, truth, rtol=0.5, atol=0.05)
+
+
+def test_what_is_left_of_a_gyroscopes_zero_is_no_gain() -> None:
+    """Slips of left and right wheels 1 % apart at one speed, less at others, by a yaw rate that is wrong by .02 rad/s."""
+    data = rows(np.full(2, 0.02))
+    by_yaw = np.array([-0.25, 0.25, -0.25, 0.25]) / np.random.default_rng(2).uniform(0.2, 0.4, (400, 1))
+    wrong = replace(data, slip=data.slip + 0.02 * by_yaw, radius_std=0.002)
+    truth, off = np.log(GAIN) - np.log(GAIN).mean(), []
+    for prior in (0.02, 0.0):
+        fit = fit_shared_gains(replace(wrong, by_yaw=by_yaw, yaw_std=prior))
+        assert fit is not None
+        off.append(np.sqrt(np.mean((fit.log_gain - truth) ** 2 / np.diag(fit.covariance)[:4])))
+    assert off[0] < 2 < 3 < off[1]

@@ -270,9 +270,12 @@ def test_a_mean_over_spells_needs_two_windows(known: int, told: bool) -> None:
 def test_a_yaw_rate_rests_at_its_mean_over_all_samples_of_standstill(vehicle: Vehicle) -> None:
     yaw = np.where(np.arange(40) < 20, 0.02, 0.05)
     yaw[11] = np.nan
-    windows = stopped((0, 6), (10, 15), (30, 35))
-    assert zeros.yaw_rate_zero(windows, vehicle, yaw) == pytest.approx((0.02 * (5 + 2) + 0.05 * 3) / 10)
-    assert zeros.yaw_rate_zero(stopped(), vehicle, yaw) == 0.0
+    windows = stopped((0, 6), (10, 15), (30, 35), yaw_rate=yaw)
+    zero, error = zeros.yaw_rate_zero(windows, vehicle)
+    assert zero == pytest.approx((0.02 * (5 + 2) + 0.05 * 3) / 10)
+    assert error == pytest.approx(np.std([0.02, 0.02, 0.05], ddof=1) / np.sqrt(3))  # between the stops
+    assert zeros.yaw_rate_zero(stopped(yaw_rate=yaw), vehicle) == (0.0, 0.005)  # never stands
+    assert zeros.yaw_rate_zero(stopped((0, 6)), vehicle) == (0.0, 0.0)  # no gyroscope
 
 
 @pytest.mark.parametrize(("scatter", "free"), [(1.9, True), (2.1, False)])

@@ -34,11 +34,12 @@ _LEAST_OFFSET = 1e-3  # N m
 
 @dataclass(frozen=True)
 class ChannelErrors:
-    """Standard deviations of constant errors: of dv/dt + g sinθ and of a_y [m/s²], of the drawbar force [N]."""
+    """Standard deviations of constant errors: of dv/dt + g sinθ and of a_y [m/s²], of the drawbar force [N], of the yaw rate [rad/s]."""
 
     push: float
     lateral: float
     drawbar: float
+    yaw: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def relative_gains(
     )
     if len(table) == 0 or len(np.unique(blocks)) < _MIN_BLOCKS:
         return [few, common]
-    rows = _rows(table, vehicle, offset_std, blocks, driven, common_radius_std)
+    rows = _rows(table, vehicle, offset_std, blocks, driven, common_radius_std, errors.yaw)
     fit = fit_shared_gains(rows)
     if fit is None or fit.blocks < _MIN_BLOCKS:
         return [few, common]
@@ -181,7 +182,13 @@ def _driving(table: Windows, vehicle: Vehicle) -> Windows:
 
 
 def _rows(
-    table: Windows, vehicle: Vehicle, offset_std: Floats, blocks: Ints, driven: Ints, radius_std: float
+    table: Windows,
+    vehicle: Vehicle,
+    offset_std: Floats,
+    blocks: Ints,
+    driven: Ints,
+    radius_std: float,
+    yaw_std: float = 0.0,
 ) -> Sharing:
     radius = vehicle.wheel_radius
     spin = vehicle.wheel_inertia * table.wheel_acceleration
@@ -197,6 +204,8 @@ def _rows(
         offset_std=np.maximum(offset_std[driven], _LEAST_OFFSET),
         slip_std=radius_std,
         by_delay=np.mean((table.wheel_acceleration / table.wheel_speed)[:, driven], axis=1),
+        by_yaw=(vehicle.wheel_side / (radius * table.wheel_speed))[:, driven],
+        yaw_std=yaw_std,
     )
 
 

@@ -88,7 +88,7 @@ def calibrate(
         log.check_against(vehicle)
         _refuse_other_load(log, vehicle)
     logs = [without_held(log) for log in logs]
-    quantities, unknown, yaw_zero = _zeros(logs, vehicle, sources)
+    quantities, unknown, (yaw_zero, yaw_std) = _zeros(logs, vehicle, sources)
     zeroed = Calibration(tuple(quantities), ()).apply(vehicle)
     completed = [completed_by_positions(_corrected(log, zeroed, yaw_zero)) for log in logs]
     corrected = [log for log, _ in completed]
@@ -107,7 +107,7 @@ def calibrate(
         corrected,
         rolled,
         _offset_errors(quantities, vehicle),
-        _channel_errors(quantities, vehicle, logs),
+        replace(_channel_errors(quantities, vehicle, logs), yaw=yaw_std),
         sources,
         _common_radius(rolling, vehicle),
     )
@@ -134,8 +134,8 @@ def calibrate(
 
 def _zeros(
     logs: Sequence[Recording], vehicle: Vehicle, sources: Sequence[str]
-) -> tuple[list[Quantity], list[Unknown], float]:
-    """Everything that standstill determines; the last is the gyroscope's zero, which has no place in the vehicle file."""
+) -> tuple[list[Quantity], list[Unknown], tuple[float, float]]:
+    """Everything that standstill determines; the last is the gyroscope's zero and its error, which have no place in the vehicle file."""
     noise, standing = _sensor_noise(logs, vehicle), windows(logs, vehicle, zeros.WINDOW)
     quantities: list[Quantity] = []
     unknown: list[Unknown] = []
@@ -150,7 +150,7 @@ def _zeros(
             quantities += _useful(
                 [quantity for quantity in possible if quantity.key == key], vehicle, unknown
             )
-    return quantities, unknown, zeros.yaw_rate_zero(standing, vehicle, standing.yaw_rate)
+    return quantities, unknown, zeros.yaw_rate_zero(standing, vehicle)
 
 
 def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:

@@ -9,9 +9,9 @@ m_n is the adhesion that all wheels have at the window's mean slip s_n, an unkno
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
 for its steepness d_n, which carries the wheels' small differences of slip
 (:mod:`~terragrip.estimation.calibration.steepness`). Unknown are ln k_i (mean 0: a gain common to all
-wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i (mean 0, likewise) and the offsets o_i. A larger
-radius is a longer lever, too: what is solved for in place of k_i is k_i (1 + e_i). Weighted least squares with Huber weights; (R), our
-own construction.
+wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i (mean 0, likewise), the offsets o_i and what is
+left of the gyroscope's zero, which shifts slip from side to side. A larger radius is a longer lever, too: what is solved for in place
+of k_i is k_i (1 + e_i). Weighted least squares with Huber weights; (R), our own construction.
 
 Adhesion differs from place to place, so the errors of neighbouring windows are correlated: the covariance is the sandwich
 over blocks of track.
@@ -43,7 +43,8 @@ class Sharing:
 
     ``torque`` N m; ``known`` the part B without adhesion, N m; ``leverage`` r F, N m; ``slip``; ``soil`` (n,) and
     ``block`` (n,) integer labels from 0. ``radius_std`` of each wheel's relative radius, ``offset_std`` (w,) N m: the priors; ``slip_std``
-    of an error that all slips share. ``by_delay`` (n,) 1/s: what a ground speed that is late by a second adds to the slips (None: nothing).
+    of an error that all slips share. ``by_delay`` (n,) 1/s: what a ground speed that is late by a second adds to the slips (None: nothing);
+    ``by_yaw`` (n, w) s: what a yaw rate that is too large by 1 rad/s adds (None: nothing), and ``yaw_std`` the prior of that error, rad/s.
     """
 
     torque: Floats
@@ -56,6 +57,8 @@ class Sharing:
     offset_std: Floats
     slip_std: float = 0.0
     by_delay: Floats | None = None
+    by_yaw: Floats | None = None
+    yaw_std: float = 0.0
 
     def select(self, rows: Bools) -> Sharing:
         """The windows of a mask (n,)."""
@@ -68,6 +71,7 @@ class Sharing:
             soil=self.soil[rows],
             block=self.block[rows],
             by_delay=None if self.by_delay is None else self.by_delay[rows],
+            by_yaw=None if self.by_yaw is None else self.by_yaw[rows],
         )
 
 
@@ -107,7 +111,7 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
     """The gains where the curves are steeper by a factor than they look, or of another form than fits best."""
     w = data.torque.shape[1]
     problem = replace(_Problem.of(data), stretch=stretch, form=form)
-    values = problem.solve(np.zeros(3 * w), 1.0)
+    values = problem.solve(np.zeros(len(problem.prior)), 1.0)
     problem = problem.refined(values)
     values = problem.solve(values, 1.0)
     fit = problem.fit(values, 1.0)
@@ -134,19 +138,19 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
 
 @dataclass(frozen=True)
 class _Fit:
-    jacobian: Floats  # (n, w, 3 w), of the scaled residual, what m_n takes up taken out
+    jacobian: Floats  # (n, w, p), of the scaled residual, what m_n takes up taken out
     residual: Floats  # (n, w), likewise
     weight: Floats  # (n, w), of Huber
-    normal: Floats  # (3 w, 3 w), priors and the zero mean of ln k included
+    normal: Floats  # (p, p), priors and the zero mean of ln k included
     variance: float  # of a scaled residual
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """Unknowns: ln k, e, o, each (w,)."""
+    """Unknowns: ln k, e, o, each (w,), and the yaw rate's error where it has any."""
 
     data: Sharing
-    prior: Floats  # (3 w, 3 w) precision
+    prior: Floats  # (p, p) precision, p = 3 w, or 3 w + 1
     torque_noise: float
     steepness: Floats  # (n,) d_n
     local: Floats  # (n,) relative difference of local adhesion between wheels
@@ -158,12 +162,15 @@ class _Problem:
     @classmethod
     def of(cls, data: Sharing) -> _Problem:
         n, w = data.torque.shape
-        prior = np.zeros((3 * w, 3 * w))
+        turns = data.by_yaw is not None and data.yaw_std > 0
+        prior = np.zeros((3 * w + turns, 3 * w + turns))
         prior[w : 2 * w, w : 2 * w] = np.eye(w) / data.radius_std**2
-        prior[2 * w :, 2 * w :] = np.diag(1 / data.offset_std**2)
+        prior[2 * w : 3 * w, 2 * w : 3 * w] = np.diag(1 / data.offset_std**2)
+        if turns:
+            prior[-1, -1] = data.yaw_std**-2.0
         noise = 0.02 * float(np.median(np.abs(data.torque)))
         problem = cls(data, prior, max(noise, 1e-9), np.zeros(n), np.full(n, _LOCAL))
-        return problem._with_steepness(np.zeros(3 * w))
+        return problem._with_steepness(np.zeros(len(prior)))
 
     def refined(self, values: Floats) -> _Problem:
         """The problem with the curves' steepness and each soil's scatter as the residuals show them."""
@@ -191,7 +198,7 @@ class _Problem:
     def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""
         w = self.data.torque.shape[1]
-        gain, offset = np.exp(values[:w]), values[2 * w :]
+        gain, offset = np.exp(values[:w]), values[2 * w : 3 * w]
         lever = gain * self.data.leverage
         rest = self.data.torque - offset - gain * self.data.known - lever * self._slip_part(values)
         # Adhesion differs in proportion: the spread of a torque goes with the wheel's own share of it.
@@ -205,7 +212,15 @@ class _Problem:
         w = self.data.torque.shape[1]
         slip, shift = self.data.slip, values[w : 2 * w]
         apart = slip - slip.mean(axis=1, keepdims=True) + (1 - slip) * shift
+        if len(values) > 3 * w:
+            apart = apart - self._by_yaw() * values[-1]
         return np.asarray(self.steepness[:, None] * apart)
+
+    def _by_yaw(self) -> Floats:
+        """What an error of the yaw rate adds to each slip beyond their mean (n, w), s."""
+        by_yaw = self.data.by_yaw
+        assert by_yaw is not None
+        return np.asarray(by_yaw - by_yaw.mean(axis=1, keepdims=True))
 
     def fit(self, values: Floats, scale: float) -> _Fit:
         """Linearise at the values; ``scale`` is the design effect that the priors are weighed with."""
@@ -213,11 +228,13 @@ class _Problem:
         level, residual, spread = self._levels(values)
         gain = np.exp(values[:w])
         lever = gain * self.data.leverage
-        jacobian = np.zeros((n, w, 3 * w))
+        jacobian = np.zeros((n, w, len(values)))
         own = np.arange(w)
         jacobian[:, own, own] = gain * self.data.known + lever * (level[:, None] + self._slip_part(values))
         jacobian[:, own, w + own] = lever * self.steepness[:, None] * (1 - self.data.slip)
         jacobian[:, own, 2 * w + own] = 1.0
+        if len(values) > 3 * w:
+            jacobian[:, :, -1] = -lever * self.steepness[:, None] * self._by_yaw()
         scaled = residual / spread
         robust = 1.4826 * float(np.median(np.abs(scaled)))
         weight = np.minimum(1.0, _HUBER * robust / np.maximum(np.abs(scaled), 1e-300))
@@ -228,7 +245,7 @@ class _Problem:
         jacobian -= free[..., None] * taken[:, None, :]
         scaled = scaled - free * (np.sum(weight * free * scaled, axis=1) / norm)[:, None]
         variance = float(np.sum(weight * scaled**2) / np.sum(weight)) * w / (w - 1)
-        flat = jacobian.reshape(-1, 3 * w)
+        flat = jacobian.reshape(-1, len(values))
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
         # The means of ln k and of e are 0, since m_n takes up what is common: rows of certainty.
         for part in (slice(w), slice(w, 2 * w)):
@@ -236,7 +253,7 @@ class _Problem:
         return _Fit(jacobian, scaled, weight, normal, variance)
 
     def step(self, values: Floats, scale: float) -> Floats:
-        """One Gauss-Newton step (3 w,)."""
+        """One Gauss-Newton step (p,)."""
         w, fit = self.data.torque.shape[1], self.fit(values, scale)
         gradient = np.einsum("nwp,nw->p", fit.jacobian, fit.weight * fit.residual)
         gradient -= fit.variance * scale * self.prior @ values

@@ -29,6 +29,7 @@ _DEFAULT_SLOPE = float(np.radians(0.5))  # prior of the slope where the vehicle 
 _UNKNOWN_BIAS = (
     0.3  # m/s^2, prior of an accelerometer's bias where the vehicle states none: mounting included
 )
+_UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle never stands: .3 deg/s
 _ALIKE = 3.0  # standard errors
 _IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
 
@@ -253,8 +254,14 @@ def inclination_zeros(
     return [bias, pitch], []
 
 
-def yaw_rate_zero(windows: Windows, vehicle: Vehicle, yaw_rate: Floats) -> float:
-    """Mean of the yaw rate (n,) at standstill, 0 without any: a gyroscope's zero shifts the slip from side to side."""
-    stops = standstills(windows, vehicle)
-    rest = [yaw_rate[s.rows][np.isfinite(yaw_rate[s.rows])] for s in stops]
-    return float(np.mean(np.concatenate(rest))) if sum(map(len, rest)) else 0.0
+def yaw_rate_zero(windows: Windows, vehicle: Vehicle) -> tuple[float, float]:
+    """The gyroscope's mean at standstill and its standard error, rad/s: its zero shifts slip from side to side.
+
+    Where the vehicle never stands for two windows: 0, and what such sensors are off by.
+    """
+    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.yaw_rate[s.rows]).any()]
+    _, error = spell_mean(windows.yaw_rate, stops, windows.count, 0.0) if stops else (np.nan, np.nan)
+    if not np.isfinite(error):
+        return 0.0, _UNKNOWN_YAW if np.isfinite(windows.yaw_rate).any() else 0.0
+    rest = np.concatenate([windows.yaw_rate[s.rows] for s in stops])
+    return float(np.nanmean(rest)), error
