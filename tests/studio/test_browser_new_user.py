@@ -144,6 +144,13 @@ def test_a_job_shows_the_command_line_that_does_the_same(
     assert page.inner_text("#jobs code") == (
         "terragrip estimate day1.csv --vehicle day1-vehicle.yaml --profile day1-profile.yaml --output day1-estimates.parquet"
     )
+    page.reload()  # who comes back finds what follows, not "once there are estimates"
+    page.wait_for_selector("#next-soils")
+    assert page.inner_text("#see-estimate") == "See the drive: day1-estimates.parquet"
+    (folder / "day1-estimates.parquet").unlink()
+    page.reload()
+    page.wait_for_selector("text=ready to estimate")
+    assert not page.query_selector("#next-soils")
 
 
 def test_a_columns_choice_unit_and_sign_reach_the_profile(

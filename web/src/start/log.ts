@@ -42,7 +42,7 @@ export class LogPage {
   private looks = 0;
   private hasLabels = false;
   private estimates = "";
-  private made = new Map<string, string>(); // by kind of job, what this page had made
+  private made = new Map<string, string>(); // by kind of job, what was made of the estimates
   readonly jobs: JobList;
 
   constructor(
@@ -66,6 +66,7 @@ export class LogPage {
 
   private async open(): Promise<void> {
     await this.reload();
+    for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) if (this.items.some((item) => item.path === job.output)) this.keep(job);
     this.methods = await tried(() => get<Methods>("methods"));
     const first = this.of("profile");
     const named = `${stemOf(this.log)}-profile.yaml`;
@@ -266,12 +267,18 @@ export class LogPage {
     ]);
   }
 
-  private async ended(job: Job): Promise<void> {
-    await this.reload();
-    if (job.state !== "done") return;
+  /** What a job made of this log, now or before the page was opened; false where it made nothing of it. */
+  private keep(job: Job): boolean {
+    if (job.state !== "done") return false;
     if (job.kind === "estimate" && job.title === this.log) this.estimates = job.output;
     else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
-    else return;
+    else return false;
+    return true;
+  }
+
+  private async ended(job: Job): Promise<void> {
+    await this.reload();
+    if (!this.keep(job)) return;
     onceReleased(this.next, () => this.drawNext());
     const output = document.getElementById("wizard-output") as HTMLInputElement | null;
     if (output) output.value = freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet");
