@@ -110,6 +110,19 @@ typedef struct { /* what wheels do beyond all trends, see warp.c */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
 } tgi_warped;
 
+typedef struct { /* driven wheels over a stretch of the way, beyond their usual: sums over `length` wheel radii, and at its end means */
+    tg_real adhesion[8], slip[8], length;
+} tgi_stretch;
+
+typedef struct { /* what slips tell of loads, see hidden.c */
+    tg_real adhesion[8], slip[8]; /* wheel: low-passed over the length of unevenness */
+    tg_real pulling, slipping;    /* of all wheels, likewise */
+    tg_real way;                  /* wheel radii since the motion began anew */
+    tgi_stretch now, last[2];     /* this one, the last, and the one before that */
+    tg_real plain, beyond, weight, square, count; /* weighted means over so many pairs of stretches: of adhesions' products, of what slips add; the weights; the latter's squares */
+    tg_real load;                 /* variance of adhesion by load beyond what adhesions show; may be less than 0 */
+} tgi_hidden;
+
 typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
     tg_real mean, count;    /* of this stop's readings */
     tg_real squares, stops; /* of all stops, weighted */
@@ -218,6 +231,7 @@ struct tg_estimator {
     tgi_slope slope;
     tgi_roughness roughness;
     tgi_warped warped;
+    tgi_hidden hidden;
     tgi_slow_speed slow_speed;
     double ground_time;        /* of the last measured ground speed */
     tg_real shock;             /* variance of the accelerometer about the model, (m/s^2)^2 */
@@ -279,6 +293,8 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 
+#define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
+
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_relative(const tg_estimator *e, tg_real square);
@@ -286,7 +302,12 @@ tg_real tgi_unseen_load(const tg_estimator *e);
 tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
+/* hidden.c */
+void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh);
+tg_real tgi_by_load(const tg_estimator *e, tg_real scatter);
+
 /* warp.c */
+int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance);
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
 void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain);

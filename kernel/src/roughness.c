@@ -5,7 +5,6 @@
  * for a slope, and soil itself takes longer to change. Lengths are in wheel radii, so a machine of another size sees its own ground. */
 #include "estimator.h"
 
-#define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is what it is late for */
 #define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
 #define TG_SMALL_RESISTANCE ((tg_real)1.6e-5) /* .004 squared */
@@ -68,6 +67,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         own /= (tg_real)driven;
     }
     if (e->constants.warps) tgi_watch_warp(e, flowing, travelled, fresh, gain);
+    else if (driven > 1 && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, flowing, travelled, fresh);
     const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
     count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);
     r->square += gain * (square - r->square);
@@ -81,13 +81,13 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise (docs/decisions/0159). Of a load that is alike over TG_LOAD_LENGTH the low-pass
- * leaves length/(length + TG_LOAD_LENGTH) of the variance. */
+/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise (docs/decisions/0159), and what slips tell beside it
+ * (hidden.c). Of a load that is alike over TG_LOAD_LENGTH the low-pass leaves length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
     const tg_tuned *k = &e->settings.tuned;
-    const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length;
-    return whole * tgi_relative(e, tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0)) + tgi_square(k->least_load_spread);
+    const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length, scatter = tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0);
+    return whole * tgi_relative(e, tgi_by_load(e, scatter)) + tgi_square(k->least_load_spread);
 }
 
 /* Variance of the slope that rho_s may hold where nothing tells the slope: thrust goes into hills and soft soil alike. What rho_s does

@@ -3,7 +3,7 @@
 #include "fields.h"
 #include <limits.h>
 
-#define TG_SNAPSHOT_VERSION 18u
+#define TG_SNAPSHOT_VERSION 19u
 
 typedef struct {
     char magic[8];

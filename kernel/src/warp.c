@@ -64,18 +64,20 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
     lanes_store(warp + TG_LANES, last);
 }
 
-/* Slips of all wheels, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */
-static int32_t slips_of(const tg_estimator *e, tg_real *slip, tg_real *variance)
+/* Slips of the driven wheels of a vehicle that turns at `yaw` rad/s, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */
+int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance)
 {
-    const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels, stride = tgi_stride(n);
     const tg_real v = e->belief.x[n + 1], *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
-    int32_t fit = v > e->settings.standstill_speed;
+    int32_t fit = v > s->standstill_speed;
     tg_real sum = 0;
     for (int32_t i = 0; i < n; i++) {
         if (!(e->constants.pulls[i] > 0)) continue;
-        const tg_real inverse = 1 / omega[i], part = v * inverse * e->constants.inverse_radius[i];
+        const tg_real hub = tgi_hub_of(v - s->wheel_side[i] * yaw, s->wheel_ahead[i] * yaw);
+        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i];
         slip[i] = 1 - part;
-        fit &= part > 0 && part < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)e->settings.tuned.silence;
+        fit &= part > 0 && part < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)s->tuned.silence;
         sum += tgi_square(part * inverse) * P[i * (stride + 1)];
     }
     *variance = sum * e->constants.share;
@@ -88,7 +90,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real fresh, tg_re
     const tgi_constants *c = &e->constants;
     const tg_real soon = travelled / (e->settings.tuned.slip_length + travelled);
     tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0;
-    if (!slips_of(e, slip, &variance)) {
+    if (!tgi_slips(e, 0, slip, &variance)) { /* what a turn does is a trend, and a gyroscope's noise is none */
         memset(w->slip, 0, sizeof w->slip);
         return;
     }

@@ -1,0 +1,98 @@
+/* What slips tell of loads that forces do not show (R; docs/decisions/0163). A wheel whose torque hardly answers to a bump takes it in its slip: its force stays, and its adhesion
+ * changes with the load. Wheels share a curve, so that of a wheel's adhesion and slip, each beyond its usual and the other wheels', mu - g' s is what the load does; g' is `bend` of the
+ * secant. In a row such slips are a fraction of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches half a radius
+ * apart holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond all trends is left; where there is, warp.c counts what slips hide. */
+#include "estimator.h"
+
+#define TG_STRETCH ((tg_real)0.25) /* wheel radii over which a product's factors are means */
+#define TG_APART ((tg_real)0.5)    /* wheel radii between their middles, at least */
+
+/* Product of two deviations, each beyond the others', a driven wheel in the mean. */
+static tg_real product(const tg_estimator *e, const tg_real *a, const tg_real *b)
+{
+    const tg_real share = e->constants.share;
+    tg_real sum = 0, of_a = 0, of_b = 0;
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
+        sum += a[i] * b[i];
+        of_a += a[i];
+        of_b += b[i];
+    }
+    return (sum - of_a * of_b * share) * share / (1 - share);
+}
+
+/* What two stretches say, `away` wheel radii between their middles: of the variance that loads give adhesions, and of that of the adhesions. The first counts by how far it is beyond
+ * chance, of loads as the adhesions show them. */
+static void take_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
+{
+    tgi_hidden *h = &e->hidden;
+    const tg_tuned *k = &e->settings.tuned;
+    const tg_real slope = k->bend * tgi_max(h->pulling, 0) / tgi_max(h->slipping, k->least_slip);
+    const tg_real alike = tgi_exp(-tgi_square(away / TG_LOAD_LENGTH) / 2), shown = e->roughness.scatter + tgi_square(k->least_load_spread) * e->roughness.square;
+    tg_real here[TG_MAX_WHEELS], there[TG_MAX_WHEELS];
+    if (!(shown > 0)) return;
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
+        here[i] = now->adhesion[i] - slope * now->slip[i];
+        there[i] = before->adhesion[i] - slope * before->slip[i];
+    }
+    const tg_real plain = product(e, now->adhesion, before->adhesion), beyond = product(e, here, there) - plain;
+    if (h->count < k->hill_memory / TG_STRETCH) h->count += 1;
+    h->plain += (alike * plain - h->plain) / h->count;
+    h->beyond += (alike * beyond - h->beyond) / h->count;
+    h->weight += (alike * alike - h->weight) / h->count;
+    h->square += (tgi_square(alike * beyond) - h->square) / h->count;
+    h->load = h->beyond / (h->weight + h->square / (h->count * tgi_square(shown)));
+}
+
+/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads; less, in proportion, where they follow the curve. */
+tg_real tgi_by_load(const tg_estimator *e, tg_real scatter)
+{
+    const tgi_hidden *h = &e->hidden;
+    if (h->load >= 0 || !(h->plain > 0)) return scatter + tgi_max(h->load, 0);
+    return scatter * tgi_max(1 + h->load * h->weight / h->plain, 0);
+}
+
+static void end_stretch(tg_estimator *e)
+{
+    tgi_hidden *h = &e->hidden;
+    tgi_stretch *const now = &h->now, *const last = &h->last[0], *const older = &h->last[1];
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
+        now->adhesion[i] /= now->length;
+        now->slip[i] /= now->length;
+    }
+    const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2;
+    const tgi_stretch *const before = near >= TG_APART ? last : older;
+    const tg_real away = near >= TG_APART ? near : far;
+    if (before->length > 0 && away < 2 * TG_LOAD_LENGTH && h->way > e->settings.tuned.uneven_length + far) take_product(e, now, before, away);
+    *older = *last;
+    *last = *now;
+    memset(now, 0, sizeof *now);
+}
+
+/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh`: its weight over the length of unevenness. `flowing`: the row goes on from that one. */
+void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh)
+{
+    tgi_hidden *h = &e->hidden;
+    const tg_real *const mu = e->belief.x, *const at_rest = e->constants.at_rest;
+    tg_real slip[TG_MAX_WHEELS] = {0}, variance, pull = 0, mean = 0;
+    if (!flowing || !tgi_slips(e, (tg_real)e->direction * e->yaw_rate, slip, &variance)) {
+        memset(&h->now, 0, sizeof h->now);
+        memset(h->last, 0, sizeof h->last);
+        h->way = 0;
+        return;
+    }
+    const tg_real gain = h->way > 0 ? tgi_max(fresh, travelled / (h->way + travelled)) : 1; /* a plain mean at first */
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+        if (!(e->constants.pulls[i] > 0)) continue;
+        h->slip[i] += gain * (slip[i] - h->slip[i]);
+        h->adhesion[i] += gain * (mu[i] - h->adhesion[i]);
+        h->now.slip[i] += travelled * (slip[i] - h->slip[i]);
+        h->now.adhesion[i] += travelled * (mu[i] - h->adhesion[i]);
+        pull += at_rest[i] * mu[i];
+        mean += at_rest[i] * slip[i];
+    }
+    h->pulling += gain * (pull - h->pulling);
+    h->slipping += gain * (mean - h->slipping);
+    h->way += travelled;
+    h->now.length += travelled;
+    if (h->now.length >= TG_STRETCH) end_stretch(e);
+}

@@ -1,0 +1,85 @@
+"""A wheel whose force does not answer to its load shows it in its slip alone, far below a row's noise: what slips tell of it over a way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from terragrip.estimation import estimate
+from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
+
+RADIUS, MASS, SPEED, RESISTANCE, PULL, SLIP, RATE = 0.2, 100.0, 0.6, 0.05, 0.25, 0.05, 50.0
+SIDES = {"l": 1.0, "r": -1.0}
+NOISE = {"wheel_speed": 0.05, "ground_speed": 0.02, "drive_torque": 0.3, "drawbar_force": 2.0}
+
+
+@dataclass(frozen=True)
+class Log:
+    recording: Recording
+    adhesion: NDArray[np.float64]  # (n, 2), true
+
+
+def log(by_load: float, by_soil: float = 0.0, seed: int = 1) -> Log:
+    """Two wheels at constant torque for 150 s. Their loads and what the soil bears go to and fro, once on eight radii of way, in turns.
+
+    All of it is in the slip: adhesion is A s/(s + c), twice as large at full slip as at the usual.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(0, 150, 1 / RATE)
+    wave = np.sin(2 * np.pi * SPEED * time / (8 * RADIUS))
+    force, channels, adhesion = PULL * MASS * 9.81 / 2, {}, []
+    for side, sign in SIDES.items():
+        mu = PULL / (1 + sign * by_load * wave)
+        share = mu / PULL / (1 + sign * by_soil * wave)  # of what the curve has at the usual slip
+        slip = SLIP * share / (2 - share)
+        channels[f"wheel_speed_{side}"] = SPEED / (RADIUS * (1 - slip)) + NOISE["wheel_speed"] * rng.normal(
+            size=len(time)
+        )
+        channels[f"drive_torque_{side}"] = RADIUS * force + NOISE["drive_torque"] * rng.normal(size=len(time))
+        adhesion.append(mu)
+    pull = 2 * force - RESISTANCE * MASS * 9.81
+    channels["ground_speed"] = SPEED + NOISE["ground_speed"] * rng.normal(size=len(time))
+    channels["drawbar_force"] = pull + NOISE["drawbar_force"] * rng.normal(size=len(time))
+    return Log(Recording(time, channels), np.stack(adhesion, axis=1))
+
+
+def vehicle() -> Vehicle:
+    return Vehicle.from_dict(
+        {
+            "name": "two wheels",
+            "mass": MASS,
+            "track": 0.6,
+            "hitch_height": 0.2,
+            "center_of_gravity_height": 0.2,
+            "axles": {"only": {"mass": MASS, "wheels": list(SIDES)}},
+            "wheel": {"radius": RADIUS, "inertia": 0.2},
+            "sensors": NOISE,
+            "uncertainty": {},
+        }
+    )
+
+
+def adhesions(made: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Error and SD of both wheels after 50 s, half of the way."""
+    found, late = estimate(made.recording, vehicle()), made.recording.time > 50
+    estimated, spread = (
+        np.stack([found[f"adhesion_{side}{end}"] for side in SIDES], axis=1)[late] for end in ("", "_std")
+    )
+    return estimated - made.adhesion[late], spread
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_loads_that_only_slips_show_are_in_the_interval(seed: int) -> None:
+    """Ten per cent of load: .003 of slip, where a row's noise is .016."""
+    error, spread = adhesions(log(by_load=0.1, seed=seed))
+    assert np.std(error) > 0.6 * 0.1 * PULL / np.sqrt(2)
+    assert np.mean(np.abs(error) <= 1.96 * spread) > 0.9
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_on_even_ground_slips_noise_widens_nothing(seed: int) -> None:
+    _, spread = adhesions(log(by_load=0.0, seed=seed))
+    assert np.sqrt(np.mean(spread**2)) < 0.04 * PULL
