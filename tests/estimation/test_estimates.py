@@ -186,3 +186,10 @@ def test_wheels_that_do_not_fit_are_refused():
     channels = {name.replace("_fl", "_xx"): values for name, values in recording.channels.items()}
     with pytest.raises(InputError, match="xx"):
         estimate(Recording(recording.time, channels), robot())
+
+
+def test_paths_in_place_of_a_log_and_a_vehicle_are_told_what_to_give() -> None:
+    with pytest.raises(InputError, match=r"str is no vehicle; give what Vehicle\.load\(path\) returns"):
+        estimate(labelled(2.0), "robot.yaml")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"str is not a table; give what tg\.read\(path\) returns"):
+        estimate("log.csv", robot())

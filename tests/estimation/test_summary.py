@@ -208,3 +208,31 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
         text.splitlines()[-1]
         == "Next: 'terragrip report out.parquet -o report.html' shows slip over time and place."
     )
+
+
+@pytest.mark.parametrize(
+    "note",
+    [
+        "With hardly a torque the wheels l, r slip by 0.51 [...]. Check the radius (not the diameter).",
+        "drawbar_force is -0.16 of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile.",
+        "pitch reaches 2.86 rad: it may be in degrees.",
+    ],
+)
+def test_what_a_note_doubts_is_settled_before_all_else(note: str) -> None:
+    tally = Tally()
+    assert tally.text([note]).splitlines()[-1].startswith("Next: correct the units and signs")
+
+
+def test_the_next_command_is_not_given_a_file_that_it_cannot_read() -> None:
+    time = np.arange(0, 10, 0.1)
+    columns = {
+        f"{name}{end}": np.full(100, 0.1) for name in ("adhesion_l", "ground_speed") for end in ("", "_std")
+    }
+    tally = Tally()
+    tally.add(tg.Estimates(time, columns, np.zeros(100, dtype=int), {}, {"vehicle": {}}))
+    assert "'terragrip report out.parquet" in tally.text(output="out.parquet").splitlines()[-1]
+    last = tally.text(output="out.xlsx").splitlines()[-1]
+    assert (
+        last
+        == "Next: estimate again into a Parquet file ('-o out.parquet') for the commands that go on from it."
+    )

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from terragrip.errors import InputError
 from terragrip.estimation.by_engine import ByEngine
 from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.estimates import Estimates
@@ -20,11 +21,11 @@ from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
 from terragrip.recording.alignment import aligned
+from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import os
 
-    from terragrip.vehicle import Vehicle
 
 Progress = Callable[[int, int], None]
 
@@ -97,6 +98,10 @@ def estimated(
     reached.
     """
     options = options or RunOptions()
+    if not isinstance(vehicle, Vehicle):
+        raise InputError(
+            f"{type(vehicle).__name__} is no vehicle", hint="give what Vehicle.load(path) returns"
+        )
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
         driven = ByEngine(whole, vehicle)
         yield from driven.completed(

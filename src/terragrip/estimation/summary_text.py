@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,9 @@ _MOST_LABELS = 8  # rows of the table
 _SHOWN = ("slip", "adhesion", "efficiency")
 _DOUBTFUL = (
     "check ",
-    "may be in km/h",
+    "Check ",
+    "may be in ",
+    "write 'sign: -1'",
     "converted from km/h",
     "against the direction of travel",
     "are wrong there",
@@ -192,6 +195,8 @@ def _next(tally: Tally, notes: tuple[str, ...], output: str | None) -> str:
         calibrated = tally.about.get("vehicle", {}).get("calibration")
         light = "" if calibrated else "'terragrip calibrate' on a pass without load makes slip absolute; "
         return f"{light}'terragrip report {file} -o report.html' shows slip over time and place."
+    if not file.endswith(".parquet") and output is not None:
+        return f"estimate again into a Parquet file ('-o {PurePath(file).with_suffix('.parquet')}') for the commands that go on from it."
     labels = [name for name in tally.moving if name]
     if labels:
         return f"'terragrip soils {file} -o soils.json' learns a curve of each soil, best from five drives or more."

@@ -36,7 +36,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
         raise InputError(
             f"{type(frame).__name__} is not a table",
             file=source,
-            hint="give a DataFrame or a dict of arrays",
+            hint="give what tg.read(path) returns, a DataFrame or a dict of arrays",
         )
     columns: dict[str, npt.NDArray[Any]] = {}
     for name, values in pairs:
