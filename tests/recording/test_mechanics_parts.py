@@ -13,7 +13,6 @@ from terragrip.recording.mechanics import (
     Means,
     _balance_warnings,
     _dead_warnings,
-    _radius_warnings,
     _scale_sentence,
     _thrust_warnings,
     means_of,
@@ -21,6 +20,7 @@ from terragrip.recording.mechanics import (
     thrusts_of,
 )
 from terragrip.recording.pitch import pitch_warnings
+from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
 
@@ -302,13 +302,13 @@ def test_slip_at_hardly_a_torque_is_a_wrong_radius(
     log = Recording(time, channels)
     means = means_of(log)
     assert means is not None
-    notes = _radius_warnings(log, vehicle, means)
+    notes = radius_warnings(log, vehicle, means)
     assert bool(notes) is doubted
     if doubted:
         assert f"the wheels fl, fr, rl, rr slip by {1 - ratio:.2f}" in notes[0]
         assert f"they roll {ratio * RADIUS:.3g} m per radian, but the stated radius is 0.2 m" in notes[0]
     few = Recording(time, {n: v for n, v in channels.items() if n != "drive_torque_fl"})
-    assert ("fr, rl, rr slip" in " ".join(_radius_warnings(few, vehicle, means))) is doubted
+    assert ("fr, rl, rr slip" in " ".join(radius_warnings(few, vehicle, means))) is doubted
 
 
 def test_without_motion_or_vehicle_nothing_is_said(vehicle: Vehicle) -> None:

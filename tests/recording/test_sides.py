@@ -146,3 +146,25 @@ def test_torques_of_a_free_axle_around_zero_have_no_sign() -> None:
     assert [
         n for n in side_warnings(free, vehicle(), free.channels["angular_velocity_z"]) if "falls" in n
     ] == []
+
+
+def on_a_track(factor: float, *, steered: bool = False) -> list[str]:
+    data = vehicle().to_dict()
+    data["track"] = TRACK * factor
+    data["axles"]["front"]["steered"] = steered
+    log = skidding(steered=steered)
+    return [
+        note
+        for note in unit_warnings(log, Vehicle.from_dict(data))
+        if note.startswith("In turns the hubs differ")
+    ]
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.25, True), (0.6, False), (1.0, False), (2.0, True)])
+def test_a_track_that_no_scrubbing_explains_is_named(factor: float, said: bool) -> None:
+    assert bool(on_a_track(factor)) is said
+
+
+@pytest.mark.parametrize(("factor", "said"), [(0.5, True), (1.0, False), (2.0, True)])
+def test_steered_wheels_scrub_less(factor: float, said: bool) -> None:
+    assert bool(on_a_track(factor, steered=True)) is said

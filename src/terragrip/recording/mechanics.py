@@ -3,7 +3,7 @@
 Over windows of a second, averaged over the same stretch for all, an accelerometer along the vehicle reads dv/dt + g sin(pitch), and the
 wheels' thrust Σ M/r less the drawbar force is m times that plus a resistance (physics.md 1). With a wrong sign, unit, gear ratio or mass
 they are proportional by a factor other than 1. Thrust and accelerometer agree best, since both see a slope; the change of ground speed
-then decides which of them is wrong. Slip must vanish with the torque, so large slip at small torque is a wrong radius or ratio.
+then decides which of them is wrong.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from terragrip.recording.pitch import pitch_warnings
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.rolling import driven_radii, radius_warnings
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-RATIOS = (0.6, 2.2)
-"""Rim speed over ground speed that may still be slip; beyond it is a unit."""
-
 _WINDOW = 1.0  # s, at least, and two samples of the ground speed
 _MOVING = 0.15  # of the speed that a twentieth of the windows exceed
 _LEAST = 25  # windows
@@ -37,8 +35,6 @@ _SURE = 3.0  # standard errors
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
 _FACTOR = 1.8  # larger than an uncalibrated torque and an estimated mass change a force balance
-_LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
-_SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
 _PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
@@ -123,7 +119,7 @@ def motion_warnings(
     notes: list[str] = []
     if vehicle is not None and vehicle.knows_wheels:
         notes = _dead_warnings(recording, vehicle)
-        notes += _radius_warnings(recording, vehicle, means)
+        notes += radius_warnings(recording, vehicle, means)
         thrusts = {} if notes else thrusts
         notes += _pull_warnings(means, thrusts, recording, vehicle)
     if forward is not None:
@@ -164,12 +160,6 @@ def means_of(recording: Recording) -> Means | None:
         return means
     climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
     return replace(means, climb=climb)
-
-
-def driven_radii(vehicle: Vehicle) -> dict[str, float]:
-    """Radius of each driven wheel."""
-    wheels = zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
-    return {wheel: float(radius) for wheel, radius, driven in wheels if driven}
 
 
 def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str, Floats]:
@@ -334,32 +324,3 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
                 f"{shown} never {verb} while the vehicle drives: the sensor is dead, or the column is wrong."
             )
     return notes
-
-
-def _radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
-    """Slip with hardly any torque; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
-    load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
-    off: dict[str, float] = {}
-    for wheel, radius in driven_radii(vehicle).items():
-        turning, torque = (
-            recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque")
-        )
-        if turning is None or torque is None:
-            continue
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rolled = np.abs(means.speed / window_means(turning, means.place, means.count)[means.rows])
-        light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
-        shown = median(rolled[light]) if light.sum() >= _LEAST else radius
-        if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:
-            off[wheel] = shown
-    if not off:
-        return []
-    apparent, stated = (
-        float(np.median(list(off.values()))),
-        float(np.median([driven_radii(vehicle)[w] for w in off])),
-    )
-    return [
-        f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, more than any ground allows: they roll "
-        f"{apparent:.3g} m per radian, but the stated radius is {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
-        "the ticks per turn."
-    ]

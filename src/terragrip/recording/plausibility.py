@@ -9,14 +9,17 @@ import numpy.typing as npt
 
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
+from terragrip.recording.copies import copy_warnings
 from terragrip.recording.dropouts import dropout_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
-from terragrip.recording.mechanics import RATIOS, means_of, motion_warnings, thrusts_of
+from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, odometry_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.reverse import reverse_warnings
+from terragrip.recording.rolling import RATIOS
 from terragrip.recording.sides import exchanged_torques, side_warnings
+from terragrip.recording.torque_signs import sign_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
@@ -76,6 +79,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     means = means_of(recording)
     thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
     moved = motion_warnings(recording, vehicle, means, thrusts)
+    unsigned = [] if known is None else sign_warnings(recording, known)
+    copied = [] if known is None else copy_warnings(whole, known)
     speeds = [] if known is None or sided else _speed_warnings(recording, known)
     notes = [
         *speeds,
@@ -86,8 +91,13 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *turn_rate_warnings(recording, None if exchanged else vehicle, track),
         *angles,
         *_acceleration_warnings(recording),
-        *moved,
-        *(torque_warnings(recording, known, means, thrusts) if known is not None and not moved else ()),
+        *(unsigned or moved),
+        *copied,
+        *(
+            torque_warnings(recording, known, means, thrusts)
+            if known is not None and not (moved or unsigned)
+            else ()
+        ),
         *(inertial_warnings(recording, known) if known is not None else ()),
         *frozen,
         *codes,

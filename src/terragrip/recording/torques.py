@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
-from terragrip.recording.mechanics import Fit, Means, driven_radii
+from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import quantile
+from terragrip.recording.rolling import driven_radii
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 

@@ -15,6 +15,12 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
+_ALIKE = 0.95  # correlation of two rates of turn that are in proportion
+_SCRUBBED, _STEERED, _MOST = (
+    0.3,
+    0.7,
+    1.25,
+)  # hubs over rims: skid-steered (measured: .45 to .62), steered, and at most
 _UNLIKE, _OFTEN = (
     0.1,
     0.1,
@@ -47,7 +53,7 @@ def turn_rate_warnings(recording: Recording, vehicle: Vehicle | None, track: Tra
         text["the positions"] = agreement(recording.time, yaw, track.at("turn", recording.time))
     if vehicle is not None:
         text["the wheels' speeds"] = agreement(recording.time, yaw, _wheel_turn(recording, vehicle))
-    scaled = _turn_scale(recording, yaw, vehicle, track)
+    scaled = _turn_scale(recording, yaw, vehicle, track) or _track_scale(recording, yaw, vehicle)
     if scaled:
         return [scaled]
     against = [who for who, value in text.items() if value < -SURE]
@@ -115,6 +121,27 @@ def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, trac
         if 12 < ratio < 100:
             return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
     return ""
+
+
+def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> str:
+    """Where the turn by the gyroscope makes hubs differ from side to side by another size than the rims do: rims that scrub the vehicle
+    round differ by more than the hubs, never by less."""
+    if vehicle is None or not vehicle.track or not vehicle.knows_wheels:
+        return ""
+    rims = _wheel_turn(recording, vehicle, rims=True)
+    if agreement(recording.time, yaw, rims) < _ALIKE:
+        return ""
+    known = np.isfinite(yaw) & np.isfinite(rims)
+    hubs, sides = windows(recording.time, np.where(known, [vehicle.track * yaw, rims], np.nan))
+    share = float(np.sqrt(np.sum(hubs**2) / np.sum(sides**2)))
+    least = _STEERED if any(axle.steered for axle in vehicle.axles.values()) else _SCRUBBED
+    if least < share < _MOST:
+        return ""
+    return (
+        f"In turns the hubs differ from side to side by {share:.2f} times what the rims do, by angular_velocity_z and a track of "
+        f"{vehicle.track:.3g} m, where {least} to {_MOST} is possible: check the track (between the wheels' middles), the radii, and the "
+        "gyroscope's scale. Slips are wrong in turns."
+    )
 
 
 def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:

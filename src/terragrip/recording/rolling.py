@@ -1,0 +1,95 @@
+"""Slip that no ground lets a wheel have, by its torque: sentences for the user, never errors.
+
+Slip vanishes with the torque, and a wheel that pulls turns faster than its hub travels (physics.md 2). A radius, a gear ratio or a scale
+that is off adds the same slip to all rows.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.recording.ranks import median, quantile
+from terragrip.recording.turns import straight_rows
+from terragrip.recording.window_means import window_means
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.arrays import Floats
+    from terragrip.recording.mechanics import Means
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+RATIOS = (0.6, 2.2)
+"""Rim speed over ground speed that may still be slip; beyond it is a unit."""
+
+_LEAST = 25  # windows
+_LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
+_SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
+_PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
+_MOST = 0.75  # of the windows with such a thrust
+
+
+def driven_radii(vehicle: Vehicle) -> dict[str, float]:
+    """Radius of each driven wheel."""
+    wheels = zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
+    return {wheel: float(radius) for wheel, radius, driven in wheels if driven}
+
+
+def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
+    """Slip with hardly any torque, and none with much; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
+    return _free(recording, vehicle, means) or _against_the_pull(recording, vehicle, means)
+
+
+def _free(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
+    load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+    off: dict[str, float] = {}
+    for wheel, radius in driven_radii(vehicle).items():
+        torque, rolled = recording.channels.get(f"drive_torque_{wheel}"), _rolled(recording, wheel, means)
+        if rolled is None or torque is None:
+            continue
+        light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
+        shown = median(rolled[light]) if light.sum() >= _LEAST else radius
+        if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:
+            off[wheel] = shown
+    if not off:
+        return []
+    apparent, stated = (
+        float(np.median(list(off.values()))),
+        float(np.median([driven_radii(vehicle)[w] for w in off])),
+    )
+    return [
+        f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, more than any ground allows: they roll "
+        f"{apparent:.3g} m per radian, but the stated radius is {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
+        "the ticks per turn."
+    ]
+
+
+def _rolled(recording: Recording, wheel: str, means: Means) -> Floats | None:
+    """How far a wheel rolls a radian [m] in each window (n,)."""
+    turning = recording.channels.get(f"wheel_speed_{wheel}")
+    if turning is None:
+        return None
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.abs(means.speed / window_means(turning, means.place, means.count)[means.rows])
+
+
+def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
+    """Rims that go slower than the ground straight ahead, all while they pull."""
+    radii, channels = driven_radii(vehicle), recording.channels
+    rolled = {w: _rolled(recording, w, means) for w in radii}
+    known = {w: way for w, way in rolled.items() if way is not None}
+    if not radii or len(known) < len(radii) or not all(f"drive_torque_{w}" in channels for w in radii):
+        return []
+    slip = 1 - np.mean([way / radii[w] for w, way in known.items()], axis=0)
+    thrust = np.sum([means.of(channels[f"drive_torque_{w}"]) / r for w, r in radii.items()], axis=0)
+    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+    rows = np.isfinite(slip) & straight & (thrust > _PULLING * vehicle.mass * STANDARD_GRAVITY)
+    if rows.sum() < _LEAST or quantile(slip[rows], _MOST) >= 0.0:
+        return []
+    slower = -median(slip[rows])
+    return [
+        f"While the wheels pull, straight ahead, their rims go {slower:.1%} slower than the ground, which no wheel that pulls does: their "
+        "radii are too small, or ground_speed too large. Check both; 'terragrip calibrate' finds the radii."
+    ]

@@ -1,0 +1,54 @@
+"""Rims that go slower than the ground while they pull are named: radii that are too small; right ones, and noise, are not (simulation)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import SimulationResult, families
+from terragrip.vehicle import Vehicle
+
+
+def machine(number: int, chassis: families.Chassis = "sprung") -> SimulationResult:
+    kind, seed = list(families.machines("development", 24, chassis=chassis))[number]
+    return families.draw(kind, seed, rate=20.0)
+
+
+def told(result: SimulationResult, factor: float) -> list[str]:
+    """The notes with the vehicle file's radii times a factor."""
+    data = result.vehicle.to_dict()
+    for part in (data, *data["axles"].values()):
+        if part.get("wheel"):
+            part["wheel"]["radius"] *= factor
+    return unit_warnings(result.recording, Vehicle.from_dict(data))
+
+
+@pytest.mark.parametrize("chassis", ["sprung", "rigid", "rolling"])
+def test_radii_that_are_too_small_by_8_percent_are_named(chassis: families.Chassis) -> None:
+    """On most machines: one that slips by more in its work hides it."""
+    named = 0
+    for number in (0, 3, 5, 7, 10):
+        result = machine(number, chassis)
+        assert told(result, 1.0) == []
+        named += any(note.startswith("While the wheels pull, straight ahead") for note in told(result, 0.92))
+    assert named >= 3
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (0.95, False), (0.9, True)])
+def test_a_slip_of_7_percent_less_than_none_is_named(
+    columns: dict[str, np.ndarray], vehicle: Vehicle, factor: float, said: bool
+) -> None:
+    data = vehicle.to_dict()
+    data["wheel"]["radius"] *= factor
+    notes = unit_warnings(Recording.from_frame(columns), Vehicle.from_dict(data))
+    assert any("their rims go 3.3% slower than the ground" in note for note in notes) is said
+
+
+def test_without_torques_nothing_says_that_the_wheels_pull() -> None:
+    result = machine(0)
+    speeds = {n: v for n, v in result.recording.channels.items() if "torque" not in n}
+    bare = replace(result, recording=replace(result.recording, channels=speeds))
+    assert not any(note.startswith("While the wheels pull") for note in told(bare, 0.92))
