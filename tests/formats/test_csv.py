@@ -405,3 +405,36 @@ def test_a_cell_of_blanks_is_empty(tmp_path: Path) -> None:
     rows = "".join(f"{k},{'   ' if k == 4 else 1.5},2,2\n" for k in range(20))
     log.write_text("time,ground_speed,wheel_speed_l,wheel_speed_r\n" + rows)
     assert np.flatnonzero(np.isnan(read(log).channels["ground_speed"])).tolist() == [4]
+
+
+@pytest.mark.parametrize(
+    "header", ["time,signal,value", "Zeit;Kanal;Wert", "stamp,device,channel_name,Value,unit"]
+)
+def test_a_long_table_says_how_to_pivot_it(
+    tmp_path: Path, header: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from terragrip.cli import main
+
+    mark = ";" if ";" in header else ","
+    names = header.split(mark)
+    rows = [
+        mark.join(
+            {0: str(k / 10)}.get(n, "ground_speed" if n == len(names) - 2 else "1.5")
+            for n in range(len(names))
+        )
+        for k in range(30)
+    ]
+    log = tmp_path / "long.csv"
+    log.write_text("\n".join([header, *rows]) + "\n")
+    assert main(["inspect", str(log)]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert f"table.pivot_table(index={names[0]!r}, columns=" in line
+    with pytest.raises(
+        InputError,
+        match="is a long table, with a row for each value; make a column of each signal, in pandas",
+    ):
+        read(log)
+    profile = tmp_path / "p.yaml"
+    profile.write_text(f"time: {{from: {names[0]}}}\nchannels:\n  ground_speed: {{from: speed, unit: m/s}}\n")
+    with pytest.raises(InputError, match="make a column of each signal"):
+        read(log, profile)

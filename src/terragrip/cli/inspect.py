@@ -40,6 +40,7 @@ def command(
     from terragrip.files import replacing
     from terragrip.formats import inspect
     from terragrip.formats.inspection_text import summary_of
+    from terragrip.recording.checks import how_to_pivot
 
     if write_profile is not None:
         if write_profile.is_file():
@@ -74,7 +75,8 @@ def command(
         raise InputError(
             result[0].refused,
             file=result[0].file,
-            hint="log the wheels too, or join it to a log that has them",
+            hint=how_to_pivot([column.name for column in result[0].columns])
+            or "log the wheels too, or join it to a log that has them",
         )
 
 

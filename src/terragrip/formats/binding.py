@@ -9,6 +9,7 @@ import numpy as np
 from terragrip.errors import InputError, nearest
 from terragrip.formats.profile_parts import Source, TimeSource, matching
 from terragrip.formats.table import LogTable
+from terragrip.recording.checks import how_to_pivot
 from terragrip.recording.schema import TIME
 from terragrip.units import UnitError, factor_to
 
@@ -106,6 +107,7 @@ def _holds(log: LogTable, column: str) -> bool:
 def _missing(column: str, log: LogTable, *, others: bool = False) -> InputError:
     close = nearest(column, log.names)
     hint = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
+    hint = how_to_pivot(log.names) or hint
     problem = "is missing, but the profile names it"
     if others:
         problem += ", and so are the others that would do"

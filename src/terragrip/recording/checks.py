@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,48 @@ MASSES = (0.2, 10.0)
 
 _ROUNDED = 0.2  # of the stamps repeat the one before: no slip of a logger, but all of its stamps
 _HOUR, _ROUGHLY = 3600.0, 30.0  # s
+_OF_NAMES = (
+    *(
+        "signal",
+        "signalname",
+        "channel",
+        "channelname",
+        "topic",
+        "parameter",
+        "variable",
+        "series",
+        "sensor",
+        "metric",
+        "tag",
+    ),
+    *(
+        "measurement",
+        "key",
+        "field",
+        "name",
+        "kanal",
+        "kanalname",
+        "messgröße",
+        "messgroesse",
+        "grandeur",
+        "señal",
+        "segnale",
+    ),
+)
+_OF_VALUES = (
+    "value",
+    "values",
+    "val",
+    "physicalvalue",
+    "wert",
+    "messwert",
+    "valeur",
+    "valor",
+    "valore",
+    "waarde",
+    "reading",
+)
+_NARROW = 6  # columns: time, unit, source and so on may stand beside these two
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 
@@ -45,6 +88,9 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     if not missing:
         return
     near = {name: nearest(name.replace("_<wheel>", ""), columns) for name in missing}
+    pivot = how_to_pivot(columns)
+    if pivot is not None:
+        raise InputError("is a long table, with a row for each value", file=source, hint=pivot)
     # Name first the missing column that resembles one in the table.
     name = next((n for n in missing if near[n]), missing[0])
     hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
@@ -52,6 +98,19 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
         hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
     page = "formats#in-a-profile"
     raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
+
+
+def how_to_pivot(columns: Collection[str]) -> str | None:
+    """What to do with a table that has the names of its signals in one column and all values in another; None of any other table."""
+    bare = {re.sub(r"[^a-zà-ÿ]", "", name.lower()): name for name in columns}
+    names, values = (next((bare[n] for n in known if n in bare), None) for known in (_OF_NAMES, _OF_VALUES))
+    if names is None or values is None or len(columns) > _NARROW:
+        return None
+    time = next((name for name in columns if name not in (names, values)), TIME)
+    return (
+        f"make a column of each signal, in pandas: table.pivot_table(index={time!r}, columns={names!r}, values={values!r})"
+        ".reset_index().to_csv('wide.csv', index=False)"
+    )
 
 
 def remarks(columns: Collection[str]) -> list[str]:
