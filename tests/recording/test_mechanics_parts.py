@@ -302,7 +302,7 @@ def test_slip_at_hardly_a_torque_is_a_wrong_radius(
     log = Recording(time, channels)
     means = means_of(log)
     assert means is not None
-    notes = radius_warnings(log, vehicle, means)
+    notes = [note for note in radius_warnings(log, vehicle, means) if note.startswith("With hardly")]
     assert bool(notes) is doubted
     if doubted:
         assert f"the wheels fl, fr, rl, rr slip by {1 - ratio:.2f}" in notes[0]

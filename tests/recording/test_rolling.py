@@ -44,7 +44,7 @@ def test_a_slip_of_7_percent_less_than_none_is_named(
     data = vehicle.to_dict()
     data["wheel"]["radius"] *= factor
     notes = unit_warnings(Recording.from_frame(columns), Vehicle.from_dict(data))
-    assert any("their rims go 3.3% slower than the ground" in note for note in notes) is said
+    assert any("their rims go 3.2% slower than the ground" in note for note in notes) is said
 
 
 def test_without_torques_nothing_says_that_the_wheels_pull() -> None:

@@ -201,6 +201,7 @@ def test_a_gyroscope_that_never_changes_is_named_where_the_wheels_turn(value: fl
     columns["angular_velocity_z"] = np.full(len(columns["time"]), value)
     assert "its sensor is dead" in " ".join(unit_warnings(Recording.from_frame(columns), machine()))
     straight = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
-    pace = straight["wheel_speed_fl"]
-    straight |= dict.fromkeys((f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")), pace)
+    pace, draws = straight["wheel_speed_fl"], np.random.default_rng(3)
+    for wheel in ("fl", "fr", "rl", "rr"):
+        straight[f"wheel_speed_{wheel}"] = pace + 1e-4 * draws.standard_normal(len(pace))
     assert unit_warnings(Recording.from_frame(straight), machine()) == []

@@ -88,7 +88,9 @@ def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> l
     rows = np.isfinite(slip) & straight & (thrust > _PULLING * vehicle.mass * STANDARD_GRAVITY)
     if rows.sum() < _LEAST or quantile(slip[rows], _MOST) >= 0.0:
         return []
-    slower = -median(slip[rows])
+    slower = 1 - 1 / (1 - median(slip[rows]))
+    if 1 - slower < RATIOS[0]:
+        return []
     return [
         f"While the wheels pull, straight ahead, their rims go {slower:.1%} slower than the ground, which no wheel that pulls does: their "
         "radii are too small, or ground_speed too large. Check both; 'terragrip calibrate' finds the radii."
