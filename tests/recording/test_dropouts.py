@@ -31,3 +31,30 @@ def test_a_drive_and_an_axle_that_is_off_say_nothing() -> None:
     assert dropout_warnings(pulling()) == []
     off = {n: np.where(rows, 0.0, pulling().channels[n]) for n in ("drive_torque_l", "drive_torque_r")}
     assert dropout_warnings(pulling(**off)) == []
+
+
+@pytest.mark.parametrize("name", ["ground_speed", "wheel_speed_l"])
+def test_zeros_for_values_that_were_not_there_are_named(name: str) -> None:
+    """With every tenth ground speed 0 slip was .3 beyond the truth, and nothing was said."""
+    values = np.where(np.arange(len(TIME)) % 10 == 3, 0.0, log().channels[name])
+    (note,) = dropout_warnings(log(**{name: values}))
+    assert note.startswith(f"{name} is 0 in ")
+    assert "samples between others at speed, while other speeds go on" in note
+
+
+def test_a_vehicle_that_stops_for_a_moment_has_no_zeros_that_were_not_there() -> None:
+    rows = np.arange(len(TIME)) % 40 == 3
+    still = {
+        n: np.where(rows, 0.0, log().channels[n]) for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")
+    }
+    assert dropout_warnings(log(**still)) == []
+    assert (
+        dropout_warnings(log(ground_speed=np.where(TIME % 50 < 0.05, 0.0, log().channels["ground_speed"])))
+        == []
+    )
+
+
+def test_a_speed_that_creeps_is_rounded_to_0_by_chance() -> None:
+    """A vehicle that is stuck while its wheels turn."""
+    creeps = np.round(0.02 + 0.01 * np.random.default_rng(1).standard_normal(len(TIME)), 2)
+    assert dropout_warnings(log(ground_speed=creeps)) == []

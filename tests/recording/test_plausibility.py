@@ -133,3 +133,20 @@ def test_gaps_of_a_turn_are_bridged_and_nothing_stays_nothing() -> None:
         filled(time, np.array([0.0, np.nan, 2.0, 3.0, np.nan])), [0.0, 1.0, 2.0, 3.0, 3.0]
     )
     assert np.isnan(filled(time, np.full(5, np.nan))).all()
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(0.5144, "knots"), (0.447, "miles an hour"), (0.2778, "km/h")])
+def test_one_factor_of_wheels_of_unlike_radii_is_the_ground_speeds(
+    columns: Columns, vehicle: Vehicle, factor: float, unit: str
+) -> None:
+    """The front wheels' radius is the factor of a knot: their speeds were said to be rims'."""
+    data = vehicle.to_dict()
+    data["axles"]["front"]["wheel"] = {**data["wheel"], "radius": 0.53}
+    fast = columns | {"ground_speed": columns["ground_speed"] / factor}
+    fast |= {n: v * 0.2 / 0.53 for n, v in columns.items() if n.startswith("wheel_speed_f")}
+    (note,) = [
+        n
+        for n in unit_warnings(Recording.from_frame(fast), Vehicle.from_dict(data))
+        if "times the ground speed" in n
+    ]
+    assert f"ground_speed may be in {unit}" in note

@@ -39,6 +39,8 @@ _RATIOS = (
     (9.5493, "wheel_speed may be in rpm: 1 rpm is 0.1047 rad/s"),
     (57.296, "wheel_speed may be in deg/s: 1 deg/s is 0.01745 rad/s"),
     (1 / 3.6, "ground_speed may be in km/h: 1 km/h is 0.2778 m/s"),
+    (0.51444, "ground_speed may be in knots: 1 kn is 0.5144 m/s"),
+    (0.44704, "ground_speed may be in miles an hour: 1 mph is 0.447 m/s"),
     (0.10472, "wheel_speed may have been converted from rpm twice, or ground_speed is 9.55 times too fast"),
     (0.15915, "wheel_speed may be in revolutions per second: 1 rev/s is 6.283 rad/s"),
     (0.017453, "wheel_speed may have been converted from degrees to radians twice"),
@@ -75,7 +77,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         return [*codes, *clock, *made]
     shown = None if known is None else shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
-    sided = [] if known is None else side_warnings(recording, known, shown)
+    sided, uneven = ([], []) if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
     thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
     moved = motion_warnings(recording, vehicle, means, thrusts)
@@ -85,6 +87,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     notes = [
         *speeds,
         *sided,
+        *uneven,
         *_drive_warnings(recording),
         *_position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds)),
         *exchanged,
@@ -116,14 +119,24 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     result: dict[str, list[tuple[str, float]]] = {}
     straight = straight_rows(recording, vehicle)
     usual: dict[str, float] = {}
+    ratios = {
+        wheel: _speed_ratio(recording, wheel, float(radius), straight)
+        for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)
+    }
+    # of wheels of unlike radii one factor is none of the radii
+    known = [ratio for ratio in ratios.values() if ratio]
+    unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
+    shared = unlike and len(known) > 1 and max(known) < np.sqrt(_APART) * min(known)
     for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
-        ratio = _speed_ratio(recording, wheel, float(radius), straight)
+        ratio = ratios[wheel]
         if ratio is not None and driven:
             usual[wheel] = ratio
         if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
             continue
-        reasons = [(radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"), *_RATIOS]
-        reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
+        reasons = list(_RATIOS)
+        if not shared:
+            reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
+            reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
         # Where two reasons fit, the nearer one is reported.
         distance, why = min((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
         if distance > np.log(1.35):

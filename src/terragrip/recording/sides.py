@@ -35,8 +35,9 @@ _OPPOSED = 0.7  # correlation, of the other sign
 _HARD = 0.05  # of a wheel's load: sides that are driven against each other in turns
 
 
-def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
-    """Sentences on wheels of a wrong sign, radius, or torque scale. ``turn`` (n,) [rad/s], left positive: by a sensor.
+def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> tuple[list[str], list[str]]:
+    """Sentences on wheels of a wrong sign or radius, and on torques of a wrong sign or scale. ``turn`` (n,) [rad/s], left positive: by a
+    sensor.
 
     Without one the vehicle goes straight ahead where all its rims say so; what they say of each other is then not asked.
     """
@@ -47,14 +48,14 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
         else _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
     )
     if drive is None:
-        return backward
+        return backward, []
     straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
     if turn is None:
         apart = np.max([np.abs(np.diff(axle.rims, axis=0)[0]) for axle in drive.axles], axis=0)
         straight &= apart < _STRAIGHT * drive.pace
     rolling = [] if turn is None else [note for axle in drive.axles for note in _rolling(axle, straight)]
     opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
-    return rolling or opposed or _uneven(drive.axles, straight)
+    return rolling, [] if rolling else opposed or _uneven(drive.axles, straight)
 
 
 def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:

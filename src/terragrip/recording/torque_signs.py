@@ -41,7 +41,7 @@ def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if min(float(np.nanmin(channels[name], initial=0.0)) for name in names) < 0.0:
         return []
     known = recording.time[np.isfinite(ground)]
-    if len(known) < _LEAST:
+    if len(known) < _LEAST or np.any(np.diff(recording.time) < 0):
         return []
     length = max(_WINDOW, 2 * median(np.diff(known)))
     place = ((recording.time - recording.time[0]) / length).astype(np.intp)
