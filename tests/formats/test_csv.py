@@ -438,3 +438,52 @@ def test_a_long_table_says_how_to_pivot_it(
     profile.write_text(f"time: {{from: {names[0]}}}\nchannels:\n  ground_speed: {{from: speed, unit: m/s}}\n")
     with pytest.raises(InputError, match="make a column of each signal"):
         read(log, profile)
+
+
+def _some_rows(names: list[str]) -> list[list[str]]:
+    return [[f"{k / 10}", *[f"{1 + k / 100 + n:.3f}" for n in range(len(names) - 1)]] for k in range(40)]
+
+
+def test_a_header_of_two_rows_names_the_columns_by_group_where_a_name_alone_does_not(tmp_path: Path) -> None:
+    names = ["Time", "Ground speed", "FL", "FR", "FL", "FR"]
+    rows = _some_rows(names)
+    text = ["General,,Wheel speed,,Torque,", ",".join(names), "s,m/s,rad/s,rad/s,Nm,Nm", *map(",".join, rows)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(text) + "\n")
+    table = read_table(log)
+    assert table.names == (
+        "Time",
+        "Ground speed",
+        "Wheel speed FL",
+        "Wheel speed FR",
+        "Torque FL",
+        "Torque FR",
+    )
+    assert table.units["Torque FR"] == "Nm"
+    assert table.columns["Torque FL"].tolist() == [float(row[4]) for row in rows]
+    log.write_text("\n".join([text[0], text[1], *text[3:]]) + "\n")
+    assert read_table(log).names == table.names
+    found = inspect(log).proposals
+    assert {
+        "wheel_speed_fl",
+        "wheel_speed_fr",
+        "drive_torque_fl",
+        "drive_torque_fr",
+        "ground_speed",
+    } <= found.keys()
+
+
+def test_names_with_blanks_hide_no_tab_where_cells_are_missing(tmp_path: Path) -> None:
+    """Blanks made more cells numbers than tabs did."""
+    names = ["time", "ground speed", "wheel speed fl", "wheel speed fr"]
+    rows = [[row[0], row[1] if k % 2 else "", *row[2:]] for k, row in enumerate(_some_rows(names))]
+    log = tmp_path / "log.txt"
+    log.write_text("\n".join("\t".join(row) for row in [names, *rows]) + "\n")
+    assert read_table(log).names == tuple(names)
+
+
+def test_three_dashes_are_no_value(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,ground_speed,wheel_speed_l\n0,1,2\n0.1,---,2.1\n0.2,1.1,---\n")
+    table = read_table(log)
+    assert np.isnan(table.columns["ground_speed"]).tolist() == [False, True, False]

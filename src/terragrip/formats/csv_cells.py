@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _BLANKS = re.compile(rb"[ \t]+")
 _MISSING = [
     *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
-    *("-", "--", "1.#QNAN", "-1.#IND", "nan(ind)", "-nan(ind)"),
+    *("-", "--", "---", "1.#QNAN", "-1.#IND", "nan(ind)", "-nan(ind)"),
 ]
 
 

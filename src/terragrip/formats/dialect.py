@@ -19,7 +19,7 @@ _COMMENTS = (b"#", b"%", b"//")
 _LONGEST_PREAMBLE = 30  # lines
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
 _NAME = re.compile(r"[^\W\d]|[/\[]")
-_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf")
+_EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf")
 _WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
 
 
@@ -57,6 +57,9 @@ def detect(data: bytes, source: str) -> Dialect:
     start, lines = _after_lines(data, start, before), lines[before:]
     separator, decimal = _best(lines)
     header = split(_without_mark(lines[0]), separator)
+    grouped = _under_groups(header, lines, separator, decimal)
+    if grouped is not None:
+        header, start, lines = grouped, _after_lines(data, start, 1), lines[1:]
     second = split(lines[1], separator) if len(lines) > 1 else []
     if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
         raise InputError(
@@ -80,6 +83,25 @@ def detect(data: bytes, source: str) -> Dialect:
     names, notes = _names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
     return Dialect(separator, decimal, names, {**notes, **units}, _after_lines(data, start, rows))
+
+
+def _under_groups(groups: list[str], lines: list[str], separator: str, decimal: str) -> list[str] | None:
+    """The names of a header of two rows, where the first names groups of columns (``groups``, empty behind each); None of any other.
+
+    A name that stands in several groups has its group's before it.
+    """
+    if len(lines) < 4 or 3 * groups.count("") < len(groups) or not groups[0]:
+        return None
+    names, third = split(lines[1], separator), split(lines[2], separator)
+    if len(names) != len(groups) or not all(_NAME.match(name) for name in names):
+        return None
+    if _is_units_row(names, third, decimal):
+        return None
+    whole, group = [], ""
+    for own, name in zip(groups, names, strict=True):
+        group = own or group
+        whole.append(f"{group} {name}" if names.count(name) > 1 else name)
+    return whole
 
 
 def _preamble(lines: list[str]) -> int:
@@ -115,7 +137,7 @@ def split(line: str, separator: str) -> list[str]:
 
 def _best(lines: list[str]) -> tuple[str, str]:
     """Separator and decimal sign under which the lines make the best table."""
-    best, chosen = (-1.0, -1.0, -1.0), (",", ".")
+    best, chosen = (-1.0, -1.0, -1.0, -1.0), (",", ".")
     for separator in (*_SEPARATORS, " "):
         table = [split(line, separator) for line in lines]
         width = len(table[0])
@@ -125,11 +147,12 @@ def _best(lines: list[str]) -> tuple[str, str]:
         usual = max(set(widths), key=widths.count) if body else width
         fitting = sum(abs(own - usual) <= 1 for own in widths) / len(body) if body else 1.0
         fitting *= usual > 1 or abs(usual - width) <= 1
+        named = float(abs(usual - width) <= 1)  # names may have blanks in them
         for decimal in (".",) if separator == "," else (".", ","):
             cells = [cell for row in body[:20] for cell in row]
             numbers = sum(_is_number(cell, decimal) for cell in cells)
             share = round(numbers / len(cells), 2) if cells else 0.0
-            score = (round(fitting, 1) * (width > 1), share if width > 1 else 0.0, float(width))
+            score = (round(fitting, 1) * (width > 1), named, share if width > 1 else 0.0, float(width))
             if score > best:
                 best, chosen = score, (separator, decimal)
     # One column has no separator: a comma in its numbers is the decimal sign.

@@ -53,7 +53,7 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         None,
     )
     if (
-        not (name.has("time") or words & {"t"} or unit)
+        not (name.has("time") or words & {"t", "ts"} or unit)
         or name.has("statistic", "command", "distance", "speed")
         or len(known) < 2
     ):

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 _FASTEST = 100.0  # m/s
 _LIMITS = {
-    "ground_speed": _FASTEST,
-    "wheel_based_speed": _FASTEST,
     "pitch": 7.0,
     "roll": 7.0,  # rad: more than a turn
     **{f"acceleration_{axis}": 500.0 for axis in "xyz"},
@@ -53,6 +51,8 @@ def _limit(name: str, vehicle: Vehicle | None) -> float | None:
     """What no machine, or not this one, can exceed, in the channel's unit; None where nothing is known."""
     if name in _LIMITS:
         return _LIMITS[name]
+    if name in ("ground_speed", "wheel_based_speed"):
+        return _FASTEST
     quantity, wheel = split_channel(name) or ("", "")
     radius = 1.0 if quantity == "drive_torque" else _SMALLEST
     if vehicle is not None and vehicle.knows_wheels and wheel in vehicle.wheels:
