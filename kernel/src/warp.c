@@ -84,16 +84,26 @@ int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *va
     return fit;
 }
 
-static void watch_slips(tg_estimator *e, tg_real travelled, tg_real fresh, tg_real gain)
+/* How far the driven wheels' rims go for each metre of the vehicle. */
+static tg_real rims_way(const tg_estimator *e)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real way = 0;
+    for (int32_t i = 0; i < n; i++) way += e->constants.pulls[i] * e->belief.x[n + 2 + i] * e->settings.rolling_radius[i];
+    return way * e->constants.share / e->belief.x[n + 1];
+}
+
+static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
 {
     tgi_warped *w = &e->warped;
     const tgi_constants *c = &e->constants;
-    const tg_real soon = travelled / (e->settings.tuned.slip_length + travelled);
     tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0;
     if (!tgi_slips(e, 0, slip, &variance)) { /* what a turn does is a trend, and a gyroscope's noise is none */
         memset(w->slip, 0, sizeof w->slip);
         return;
     }
+    const tg_real rolled = travelled * rims_way(e), soon = rolled / (e->settings.tuned.slip_length + rolled);
+    const tg_real fresh = rolled / (e->settings.tuned.uneven_length + rolled); /* where wheels spin on the spot the vehicle's way stands still */
     tgi_warp(c, slip, warp);
     const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
     const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row tells less than usual */
@@ -118,7 +128,7 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
     tgi_warped *w = &e->warped;
     tgi_warp(&e->constants, e->belief.x, w->now);
     for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
-    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled, fresh, gain);
+    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled, gain);
     else memset(w->slip, 0, sizeof w->slip);
 }
 
