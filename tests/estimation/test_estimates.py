@@ -117,7 +117,7 @@ def test_what_is_no_table_of_estimates_is_refused(tmp_path):
     with pytest.raises(InputError, match="Parquet"):
         Estimates.read(path)
     pd.DataFrame({"time": [0.0]}).to_parquet(path)
-    with pytest.raises(InputError, match="no table of estimates"):
+    with pytest.raises(InputError, match="not a table of estimates"):
         Estimates.read(path)
     with pytest.raises(InputError, match="no such file"):
         Estimates.read(tmp_path / "none.parquet")
@@ -168,7 +168,7 @@ def in_blocks(blocks):
 def test_a_failing_block_leaves_no_file(tmp_path):
     recording = labelled()
     backwards = in_blocks([recording.select(slice(400, 800)), recording.select(slice(0, 400))])
-    with pytest.raises(InputError, match="does not run forward"):
+    with pytest.raises(InputError, match="does not increase"):
         write_parts(estimated(backwards, robot()), tmp_path / "e.parquet")
     with pytest.raises(InputError, match="no row"):
         write_parts(estimated(in_blocks([]), robot()), tmp_path / "e.parquet")

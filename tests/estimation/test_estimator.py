@@ -112,8 +112,8 @@ def test_an_estimate_is_read_by_name(noisy):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"time": 0.5}, "does not run forward"),
-        ({"time": 0.4}, "does not run forward"),
+        ({"time": 0.5}, "does not increase"),
+        ({"time": 0.4}, "does not increase"),
         ({"time": math.nan}, "time is nan"),
         ({"time": None}, "time is None"),
         ({"ground_speed": math.inf}, "ground_speed is inf"),
