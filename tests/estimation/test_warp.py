@@ -132,11 +132,14 @@ def test_a_diagonals_slip_is_forgotten_as_its_wheels_roll_on() -> None:
     """The vehicle all but stops, its wheels spin on at one speed: what a diagonal slipped before says nothing of them any more."""
     plain, before = drive(30.0), slipping(drive(30.0))
     time = plain.recording.time
-    stop = 20 + np.argmax(np.abs(told(before)[0][(time > 20)[time > 10]])) / 100  # where the diagonal's adhesions differ most
+    stop = (
+        20 + np.argmax(np.abs(told(before)[0][(time > 20)[time > 10]])) / 100
+    )  # where the diagonal's adhesions differ most
     alike = time > stop
     slow = 1 - 0.85 * np.clip((time - stop) / 0.1, 0, 1)
     channels = {
-        name: np.where(alike, plain.recording.channels[name], values) * (slow if name == "ground_speed" else 1)
+        name: np.where(alike, plain.recording.channels[name], values)
+        * (slow if name == "ground_speed" else 1)
         for name, values in before.recording.channels.items()
     }
     estimates = estimate(replace(before.recording, channels=channels), robot())
