@@ -131,7 +131,7 @@ def test_unusable_inputs_are_one_line(files, tmp_path, capsys):
     broken["soils"]["fine"]["signature"]["level"] = "high"
     newer.write_text(json.dumps(broken))
     line = fails(capsys, out, files[0], "--library", newer)
-    assert "soils.fine.signature: is no signature" in line
+    assert "soils.fine.signature: is not a signature" in line
     assert "newer.json" in line
     estimates = Estimates.read(files[0])
     del estimates.columns["adhesion_fl"]

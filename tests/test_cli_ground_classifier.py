@@ -110,7 +110,7 @@ def test_labels_may_be_a_column_of_the_logs(tmp_path: Path, capsys: pytest.Captu
         ("file,ground\nhard1.csv,hard\n", [], "line 1: has no column label"),
         ("file,label\nhard1.csv,hard,dry\n", [], "row 2: has 3 cells for 2 columns"),
         ("file,label\n", [], "holds no run"),
-        ("file;label\nhard1.csv;unknown\nloose1.csv;loose\n", [], "'unknown' is no ground to learn"),
+        ("file;label\nhard1.csv;unknown\nloose1.csv;loose\n", [], "'unknown' cannot be learned as a ground"),
         ("file,label\nhard1.csv,hard\nloose1.csv,loose\n", ["--window", "0.2"], "shorter than two samples"),
         (
             "file,label\nhard1.csv,hard\nloose1.csv,loose\n",

@@ -47,7 +47,7 @@ def test_a_tractors_hour_from_inspect_to_report(
         code, _, wrong = run(capsys, step, out, "-o", tmp_path / f"{step}.json")
         assert code == 2
         assert wrong.count("\n") == 1
-        assert "holds slip but no adhesion" in wrong
+        assert "has slip but no adhesion" in wrong
     calibrated = tmp_path / "c.yaml"
     assert run(capsys, "calibrate", log, "--vehicle", vehicle, "--profile", profile, "-o", calibrated)[0] == 0
     # The same zero of slip, whoever finds it.

@@ -136,7 +136,7 @@ def read_json(
         raise InputError(f"holds no {key!r}", file=file, hint=hint)
     result = data.get("version", version)
     if not isinstance(result, int) or result > version:
-        problem = f"is of version {result}, this terragrip reads up to {version}"
+        problem = f"is of version {result}, this Terragrip reads up to {version}"
         raise InputError(problem, file=file, hint="update terragrip")
     return data
 

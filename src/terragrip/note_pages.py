@@ -63,14 +63,14 @@ PAGES = (
     ("The engine's own friction is not in the log", "vehicle#engine-torque-in-place-of-wheel-torques"),
     ("frames are in no DBC or table", "formats#can-logs"),
     ("of the DBC's messages occurs in the log", "formats#can-logs"),
-    ("No time vector stands beside", "formats#matlab-and-simulink"),
-    ("What is no series of plain numbers was left out", "formats#matlab-and-simulink"),
+    ("There is no time vector beside", "formats#matlab-and-simulink"),
+    ("Not series of plain numbers", "formats#matlab-and-simulink"),
     ("The last row is cut off", "formats#damaged-files-and-large-ones"),
     ("are damaged and were left out", "formats#damaged-files-and-large-ones"),
     ("The file ends early, or is damaged", "formats#damaged-files-and-large-ones"),
     ("cannot be read and were left out", "formats#damaged-files-and-large-ones"),
     ("No soil of the library fits", "ground#limits"),
-    ("of the drive tells of the ground", "ground#limits"),
+    ("of the drive shows the ground", "ground#limits"),
     ("too short for vehicle and tool", "ground#limits"),
     ("s behind the wheels and are shifted by it", "maps#what-a-cell-holds"),
     ("of the positions, ", "maps#what-a-cell-holds"),
@@ -79,7 +79,7 @@ PAGES = (
     ("Every cell was driven once", "maps#anomalies-and-changes"),
     ("bins of slip gather weak spots", "soils#by-pull-and-by-slip"),
     ("no interval can be determined", "soils#what-is-done"),
-    ("they do not hold how much runs differ", "soils#what-is-done"),
+    ("they do not cover the differences between runs", "soils#what-is-done"),
 )
 """Words of a note, and page#heading as in ``InputError(page=...)``."""
 

@@ -34,4 +34,4 @@ def complaint(cell: str) -> tuple[str, str] | None:
     problem = f"{cell!r} is not a number"
     if sign in ",." and len(re.findall("[.,]", cell)) == 1:
         problem = f"{cell!r} may be {cell.replace(sign, '')} or {cell.replace(sign, '.')}"
-    return problem, "write numbers without a sign between thousands"
+    return problem, "write numbers without a thousands separator"

@@ -65,7 +65,7 @@ def doubt(cells: Sequence[str | None]) -> tuple[int, str, str] | None:
     row = rows[0]
     cell, (one, two) = str(cells[row]).strip(), _pair(matches[row])
     if one > 12 or two > 12:
-        problem = f"{cell!r} and other dates have day and month in different places"
+        problem = f"{cell!r} and other dates have day and month in different order"
         return row, problem, "write all dates alike, as 2024-04-03"
     problem = f"{cell!r} may be the {one}. of month {two} or the {two}. of month {one}"
     return row, problem, f"write 2024-04-03, or in a profile 'dates: {ORDERS[0]}' (or {ORDERS[1]}) for time"
@@ -99,7 +99,7 @@ def _seconds(match: re.Match[str]) -> float:
     part, hour, half = match["part"] or "0", int(match["hour"]), match["half"]
     if half:
         if not 1 <= hour <= 12:
-            raise ValueError("no hour of a half day")
+            raise ValueError("not an hour of a half day")
         hour = hour % 12 + 12 * (half in "Pp")
     return 3600 * hour + 60 * int(match["minute"]) + int(match["second"]) + int(part) / 10 ** len(part)
 

@@ -312,7 +312,7 @@ def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
     assert ran(logs, "--map")[0] == 0
     summary = pd.read_parquet(place / "out/summary.parquet").set_index("log")
     assert "metres of a grid" in summary["no_map"]["metres.csv"]
-    assert summary["no_map"]["without.csv"] == "holds no positions"
+    assert summary["no_map"]["without.csv"] == "has no positions"
     (file,) = (place / "out/cells").rglob("*.parquet")
     cells = pd.read_parquet(file, partitioning=None)
     assert set(cells["log"]) == {"mapped.csv"}

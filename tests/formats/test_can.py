@@ -210,7 +210,7 @@ def test_refusals(tmp_path: Path, dbc: Path) -> None:
         read(tractor)
     with pytest.raises(InputError, match="map its signals in a profile: tractor-isobus, ros2-4wd"):
         read(tractor)
-    with pytest.raises(InputError, match=r"'tractor-isobos' is no file.*did you mean tractor-isobus"):
+    with pytest.raises(InputError, match=r"'tractor-isobos' is neither a file.*did you mean tractor-isobus"):
         read(tractor, "tractor-isobos")
     with pytest.raises(InputError, match="no such file"):
         read(tractor, "tractor-isobus", dbc=tmp_path / "absent.dbc")
@@ -221,7 +221,7 @@ def test_refusals(tmp_path: Path, dbc: Path) -> None:
         "None of the DBC's messages occurs in the log (Floats, Wheels)" in note for note in wrong.notes
     )
     (tmp_path / "broken.dbc").write_text("BO_ x\n")
-    with pytest.raises(InputError, match="is no DBC that can be read"):
+    with pytest.raises(InputError, match="is not a readable DBC"):
         read(tractor, "tractor-isobus", dbc=tmp_path / "broken.dbc")
     (tmp_path / "table.csv").write_text("time,a\n0,1\n")
     with pytest.raises(InputError, match="is a text table, which needs no DBC"):
@@ -236,7 +236,7 @@ def test_a_log_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     assert 0 < len(cut.columns["time"]) < whole
     lines = write_log(tmp_path / "log.log", drive(1000, 10.0).frames).read_text().splitlines(keepends=True)
     (tmp_path / "log.log").write_text("".join(["@@@\n", *lines]))
-    assert any("1 line holds no frame: line 1 ('@@@')" in n for n in read_table(tmp_path / "log.log").notes)
+    assert any("1 line has no frame: line 1 ('@@@')" in n for n in read_table(tmp_path / "log.log").notes)
 
 
 def test_measured_john_deere(shared: Callable[[str], Path]) -> None:
@@ -366,6 +366,6 @@ def test_bad_lines_are_left_out_and_the_first_is_named(tmp_path: Path, form: str
     assert len(table.columns["time"]) == len(expected.columns["time"]) > 400
     for name, column in expected.columns.items():
         np.testing.assert_array_equal(table.columns[name], column)
-    assert any(note.startswith("3 lines hold no frame, the first is line 21 (") for note in table.notes)
+    assert any(note.startswith("3 lines have no frame, the first is line 21 (") for note in table.notes)
     unwanted = read_table(damaged, lambda name: name == "GroundBasedMachineSpeed")
     assert any("the first is line 21 (" in note for note in unwanted.notes)

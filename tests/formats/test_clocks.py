@@ -74,7 +74,7 @@ def test_a_profile_that_gives_another_unit_of_time_counts_and_is_noted(tmp_path:
     channels = {n: n for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")}
     recording = tg.read(log, Profile.from_dict({"time": {"from": "t", "unit": "s"}, "channels": channels}))
     assert recording.time[-1] == pytest.approx(TIME[-1])
-    assert "The log states ms for t; the profile's s counts." in recording.notes
+    assert "The log states ms for t; the profile's s is used." in recording.notes
 
 
 @pytest.mark.parametrize("unit", ["1/min", "min-1", "min^-1", "min⁻¹", "U/min", "RPM", "rpm", "r/min"])

@@ -130,11 +130,11 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         ("\n  \n", "is empty; give a table"),
         (HEAD, "the table is empty; give a log with at least one row"),
         ("# only\n# comments\n", "is empty"),
-        ("0,1,5\n1,1,5\n", "the first row holds numbers, not column names; put a header row"),
+        ("0,1,5\n1,1,5\n", "the first row has numbers, not column names; put a header row"),
         (HEAD + GOOD_ROWS + "2,fast,5\n", "column ground_speed, row 3: 'fast' is not a number; leave the cell empty"),
         (HEAD + GOOD_ROWS + "zwei,1,5\n", "column time, row 3: 'zwei' is not a number; give seconds, 10:00:00.5 or"),
         (HEAD + "05:03.2,1,5\n05:03.4,1,5\n", "column time, row 1: '05:03.2' is not a number; give seconds, 10:00:00.5 or"),
-        (HEAD + GOOD_ROWS + "2,1\n3,1,5\n", "row 3: has 2 cells, the header 3; give every row as many cells"),
+        (HEAD + GOOD_ROWS + "2,1\n3,1,5\n", "row 3: has 2 cells, the header 3; give every row the same number of cells"),
         (HEAD + GOOD_ROWS + "2,1,5,6,7\n", "row 3: has 5 cells, the header 3"),
         (HEAD + GOOD_ROWS + "2,inf,5\n", "column ground_speed, row 3 (time 2 s): is infinite"),
         (HEAD + GOOD_ROWS + "1,1,5\n", "column time, row 3 (time 1 s): time repeats"),
@@ -348,7 +348,7 @@ def test_dates_that_do_not_show_the_day_are_refused_until_the_profile_says_it(
 
 
 def test_dates_in_two_orders_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="and other dates have day and month in different places"):
+    with pytest.raises(InputError, match="and other dates have day and month in different order"):
         read(dated(tmp_path / "log.csv", "time", "13/04/2024", "04/14/2024"))
 
 
@@ -386,7 +386,7 @@ def test_thousands_are_no_fractions(tmp_path: Path, written: str) -> None:
     with pytest.raises(InputError) as caught:
         read(log)
     assert f"column drawbar_force, row 1: {problem}" in str(caught.value)
-    assert "write numbers without a sign between thousands" in str(caught.value)
+    assert "write numbers without a thousands separator" in str(caught.value)
     foreign = {name: f"x_{name}" for name in names[1:]}
     log.write_text("\n".join(separator.join(row) for row in (("time", *foreign.values()), *rows)) + "\n")
     with pytest.raises(InputError, match="row 1"):

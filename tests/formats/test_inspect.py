@@ -193,7 +193,7 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
     inspection = inspect(path)
     assert "ground_speed" not in inspection.recognised
     assert any(
-        "WheelBasedVehicleSpeed goes by the name of wheel_based_speed, but is 0 throughout" in w
+        "WheelBasedVehicleSpeed has the name of wheel_based_speed, but is 0 throughout" in w
         for w in inspection.warnings
     )
     assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in inspection.missing)

@@ -390,5 +390,5 @@ def test_a_schema_that_changes_in_mid_stream_is_counted(tmp_path: Path) -> None:
         writer.finish()
     table = read_table(path)
     assert np.isfinite(table.columns["/speed.v"]).sum() == 60
-    assert any("39 values are absent, or of another kind" in note for note in table.notes)
+    assert any("39 values are absent, or of another type" in note for note in table.notes)
     assert any("1 messages cannot be read" in note for note in table.notes)

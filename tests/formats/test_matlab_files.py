@@ -34,7 +34,7 @@ def test_of_names_that_differ_in_case_the_one_that_runs_forward_is_time(
     assert np.allclose(table.columns["time"], TIME)
     assert np.allclose(table.columns["v"], SPEED)
     assert np.allclose(table.columns[second], HOT)
-    assert any(f"{first} is taken for time; {second} is a signal" in note for note in table.notes)
+    assert any(f"{first} is used as time; {second} is a signal" in note for note in table.notes)
 
 
 @pytest.mark.parametrize("version", ["5", "7.3"])
@@ -71,7 +71,7 @@ def test_tables_and_timetables_that_matlab_wrote(shared: Callable[[str], Path], 
     for name, values in expected.items():
         column = table.columns[name]
         assert column[np.isfinite(column)].tolist() == values
-    left_out = next(note for note in table.notes if "No time vector" in note)
+    left_out = next(note for note in table.notes if "There is no time vector" in note)
     assert "table_numeric.Var1" in left_out
     assert not any("MATLAB alone" in note for note in table.notes)
 
@@ -90,7 +90,7 @@ def test_plain_arrays_that_matlab_wrote(shared: Callable[[str], Path]) -> None:
     (text,) = table.notes
     assert "complex_array (complex)" in text  # its real part alone would be silently wrong
     assert "struct" not in text.partition(":")[2].partition(";")[0]
-    with pytest.raises(InputError, match="holds no numeric column"):
+    with pytest.raises(InputError, match="has no numeric column"):
         read_table(shared("data/ingest_samples/matlab") / "test_string_v7.mat")
 
 
@@ -101,9 +101,9 @@ def test_a_vector_of_another_length_than_time_is_named(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "log.mat", {**content, "drawbar_force": np.ones(51)})
     table = read_table(tmp_path / "log.mat")
     assert "drawbar_force" not in table.columns
-    assert any("(50), and left out: drawbar_force (51)." in note for note in table.notes)
+    assert any("(50) were left out: drawbar_force (51)." in note for note in table.notes)
     scipy.io.savemat(tmp_path / "log.mat", {"t": time, "v": np.ones(51)})
-    with pytest.raises(InputError, match=r"time vector beside them \(50\), and left out: v \(51\)"):
+    with pytest.raises(InputError, match=r"time vector beside them \(50\) were left out: v \(51\)"):
         read_table(tmp_path / "log.mat")
 
 

@@ -45,7 +45,7 @@ def test_stamps_of_another_clock_are_moved() -> None:
 def test_stamps_that_wander_are_left_out_and_said(stamps: np.ndarray) -> None:
     time, notes = topic(stamps, SENT + 0.003)
     np.testing.assert_allclose(time, SENT + 0.003)
-    assert notes[0].startswith("/odom: its stamps wander by ")
+    assert notes[0].startswith("/odom: its stamps drift by ")
 
 
 def test_messages_that_waited_on_their_way_keep_their_stamps() -> None:

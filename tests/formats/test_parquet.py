@@ -99,7 +99,7 @@ def test_a_column_of_lists_is_refused(tmp_path: Path, log: pd.DataFrame) -> None
     path = tmp_path / "log.parquet"
     table = pa.table({**{n: log[n] for n in log if n != "ground_speed"}, "ground_speed": [[1.0, 2.0]] * 300})
     pq.write_table(table, path)
-    with pytest.raises(InputError, match=r"column ground_speed: holds list<.*>, not numbers"):
+    with pytest.raises(InputError, match=r"column ground_speed: has list<.*>, not numbers"):
         read(path)
 
 

@@ -23,12 +23,12 @@ def test_numbers_in_their_order():
 @pytest.mark.parametrize(
     ("entries", "expected"),
     [
-        ({"format": "struct", "layout": "d5f", "fields": ["a"]}, "holds 6 numbers, not 1"),
+        ({"format": "struct", "layout": "d5f", "fields": ["a"]}, "has 6 numbers, not 1"),
         ({"format": "doubles"}, "packed numbers need names"),
-        ({"format": "doubles", "layout": "d", "fields": ["a"]}, "layout goes with format struct"),
+        ({"format": "doubles", "layout": "d", "fields": ["a"]}, "layout needs format struct"),
         ({"fields": ["a"]}, "names its own fields"),
         ({"format": "struct", "layout": "9999999999d", "fields": ["a"]}, "bytes; a message has at most"),
-        ({"format": "struct", "layout": "5", "fields": ["a"]}, "is no layout"),
+        ({"format": "struct", "layout": "5", "fields": ["a"]}, "is not a layout"),
         ({"format": "struct", "layout": "@P", "fields": ["a"]}, "layout"),
     ],
 )

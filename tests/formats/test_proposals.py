@@ -104,7 +104,9 @@ def test_what_is_of_a_motor_asks_for_the_gear_ratio(
             proposal = found.proposals[channel]
             assert "gear ratio" in proposal.give
             assert proposal.entry["scale"] == 1.0
-        assert any("0.0117 m a radian" in words for words in found.proposals[f"wheel_speed_{wheel}"].evidence)
+        assert any(
+            "0.0117 m per radian" in words for words in found.proposals[f"wheel_speed_{wheel}"].evidence
+        )
     assert found.to_text().count("gear ratio") >= 8
     unknown = [line for line in found.profile.splitlines() if "scale: 1.0" in line]
     assert len(unknown) == 8

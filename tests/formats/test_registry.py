@@ -74,7 +74,7 @@ def test_the_example_of_the_docs_is_read_everywhere(folder: Path) -> None:
             "is there already",
         ),
         ("plainlog = plainlog:GONE", example()[1], "cannot be loaded"),
-        ("plainlog = plainlog:read", example()[1], "plainlog:read is no Format"),
+        ("plainlog = plainlog:read", example()[1], "plainlog:read is not a Format"),
     ],
 )
 def test_a_format_that_cannot_be_registered_is_named(

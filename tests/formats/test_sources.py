@@ -106,7 +106,7 @@ def test_tables_that_start_together_without_a_profile(tmp_path: Path) -> None:
     pd.DataFrame({"time": time + 0.05, "ground_speed": 1.0}).to_csv(tmp_path / "b.csv", index=False)
     recording = tg.read([tmp_path / "a.csv", tmp_path / "b.csv"])
     assert len(recording) == 2 * len(time)
-    assert any("b.csv is taken as it is (it starts with the first one)" in note for note in recording.notes)
+    assert any("b.csv is used as it is (it starts with the first one)" in note for note in recording.notes)
     with pytest.raises(InputError, match="2 profiles for 1 logs"):
         tg.read([tmp_path / "a.csv"], ["tractor-isobus", "simulink"])
     with pytest.raises(InputError, match="there is no log"):

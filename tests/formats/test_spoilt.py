@@ -47,7 +47,7 @@ def said(path: Path) -> str:
 def test_a_text_among_numbers_is_named_with_its_row(tmp_path: Path, cell: str) -> None:
     note = said(log(tmp_path / "a.csv", NAMES[1], {99: cell, 199: cell}))
     assert (
-        f"column Fahrgeschwindigkeit, row 100 (and 1 more): {cell!r} is not a number, as most cells there are; leave it empty"
+        f"column Fahrgeschwindigkeit, row 100 (and 1 more): {cell!r} is not a number, though most cells there are; leave it empty"
         in note
     )
     assert "is not a number" not in said(log(tmp_path / "b.csv"))
@@ -57,7 +57,7 @@ def test_signs_between_thousands_are_named(tmp_path: Path) -> None:
     grouped = (100 * table()[NAMES[6]]).map("{:,.1f}".format)
     note = said(log(tmp_path / "a.csv", NAMES[6], every=grouped))
     assert "column Radmoment VL, row 1" in note
-    assert "write numbers without a sign between thousands" in note
+    assert "write numbers without a thousands separator" in note
 
 
 @pytest.mark.parametrize("form", ["%M:%S.0", "%d.%m.%y %H:%M:%S", "%d.%m.%Y %H:%M"])
@@ -67,7 +67,7 @@ def test_a_time_in_another_form_is_named(tmp_path: Path, form: str) -> None:
     ).dt.strftime(form)
     note = said(log(tmp_path / "a.csv", "Zeit", every=stamps))
     assert (
-        f"column Zeit, row 1: {stamps[0]!r} is no time; give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5."
+        f"column Zeit, row 1: {stamps[0]!r} is not a time; give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5."
         in note
     )
 
@@ -90,7 +90,7 @@ def test_numbers_as_texts_and_durations_are_read(tmp_path: Path) -> None:
     assert recording.time[-1] == pytest.approx((ROWS - 1) / 10)
     np.testing.assert_allclose(recording["ground_speed"], table()[NAMES[1]] / 3.6)
     table().astype(str).apply(lambda column: column.str.replace(".", ",")).to_parquet(path)
-    assert "column Fahrgeschwindigkeit [km/h] holds numbers with a decimal comma as texts" in said(path)
+    assert "column Fahrgeschwindigkeit [km/h] has numbers with a decimal comma as texts" in said(path)
 
 
 def test_wheels_that_contradict_their_unit_are_named(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_wheels_that_contradict_their_unit_are_named(tmp_path: Path) -> None:
     content.assign(**{"Gierrate [rad/s]": turn}).to_csv(tmp_path / "a.csv", index=False)
     seen = inspect(tmp_path / "a.csv", vehicle=german())
     assert not any(name.startswith("wheel_speed_") for name in seen.proposals)
-    start = "Raddrehzahl HL in rad/s goes by the name of wheel_speed_hl, but "
+    start = "Raddrehzahl HL in rad/s has the name of wheel_speed_hl, but "
     (note,) = [one for one in seen.warnings if one.startswith(start)]
     assert note.endswith(": check its unit.")
 

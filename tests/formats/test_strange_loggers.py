@@ -53,8 +53,8 @@ def test_rad_per_second_called_rpm_is_in_doubt_by_the_track_of_a_small_robot() -
     }
     columns = {name: rim / 0.1 for name, rim in columns.items()}
     result = _propose(columns | {"gps_speed_mps": SPEED, "yaw_rate_radps": TURN})
-    assert "make a track of" in result["wheel_speed_l"].doubt
-    assert "make a track of" in result["wheel_speed_r"].doubt
+    assert "give a track of" in result["wheel_speed_l"].doubt
+    assert "give a track of" in result["wheel_speed_r"].doubt
 
 
 def test_where_the_ground_speeds_unit_is_wrong_no_wheel_leans_on_it() -> None:

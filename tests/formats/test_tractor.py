@@ -67,7 +67,7 @@ def test_the_command_line_says_what_is_missing(
     assert "Zero-slip radius of the drive in this log: 0.76" in output or "log: 0.77" in output
     assert tg.Estimates.read(out).wheels == ("drive",)
     assert main(["soils", str(out), "-o", str(tmp_path / "soils.json")]) == 2
-    assert "holds slip but no adhesion" in capsys.readouterr().err
+    assert "has slip but no adhesion" in capsys.readouterr().err
 
 
 def test_a_pass_without_load_makes_slip_absolute(tmp_path: Path, vehicle: Path) -> None:

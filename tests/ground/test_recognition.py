@@ -159,6 +159,6 @@ def test_nothing_to_read_is_said(library):
     estimates = drive(12, [("fine", FINE, 20)])
     estimates.event_codes[:] = 2
     ground = analyse(estimates, library)[0]
-    assert "No stretch of the drive tells of the ground" in ground.notes[0]
+    assert "No stretch of the drive shows the ground" in ground.notes[0]
     assert ground.sections[0].slip_mean is None
     assert [e.kind for e in ground.events] == ["standstill"]

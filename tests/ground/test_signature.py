@@ -62,7 +62,7 @@ def test_it_survives_the_library_file(library, tmp_path):
 )  # fmt: skip
 def test_a_damaged_one_is_refused(library, key, value):
     data = {**signature_in(library["fine"]).to_dict(), key: value}
-    with pytest.raises(InputError, match=r"soils\.fine\.signature: is no signature"):
+    with pytest.raises(InputError, match=r"soils\.fine\.signature: is not a signature"):
         Signature.from_dict(data, "soils.fine.signature")
 
 

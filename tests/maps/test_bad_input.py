@@ -56,7 +56,7 @@ def test_no_positions(tmp_path: Path, how: str, capsys: pytest.CaptureFixture[st
         moved(estimates, lambda lat, lon: (blank(lat), blank(lon)))
     code, _, error = mapped(tmp_path, estimates, capsys=capsys)
     assert code == 2
-    assert "drive.parquet: holds no positions" in error
+    assert "drive.parquet: has no positions" in error
     assert "latitude and longitude" in error
 
 
@@ -190,7 +190,7 @@ def test_an_outage_held_by_the_receiver_is_left_blank(
     estimates = moved(drive(east, north), lambda lat, lon: (lat[keep], lon[keep]))
     code, said, _ = mapped(tmp_path, estimates, capsys=capsys)
     assert code == 0
-    assert re.search(r"1 outage of the positions, (19|20|21) m of way, left blank", said)
+    assert re.search(r"1 outage of the positions, (19|20|21) m of way, left empty", said)
     x = local_east(geopandas.read_file(tmp_path / "map.gpkg", layer="cells"))
     assert not ((x > 42) & (x < 58)).any()
     assert ((x > 1) & (x < 38)).sum() > 30

@@ -59,5 +59,5 @@ def test_swapped_columns_are_found_by_the_turns_of_lanes_along_one_direction() -
 def test_no_positions_is_one_line() -> None:
     estimates = drive(*lanes(2, 30, 4))
     del estimates.columns["latitude"]
-    with pytest.raises(InputError, match="holds no positions"):
+    with pytest.raises(InputError, match="has no positions"):
         map_of([("a", estimates)])

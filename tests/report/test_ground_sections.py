@@ -106,7 +106,7 @@ def test_without_a_ground_each_section_says_so(section) -> None:
 
 
 def test_a_warning_is_listed_however_short_and_its_reason_is_read_from_the_left() -> None:
-    why = "The wheels begin to dig: slip is 41 % in the mean of the wheels, at 0.31 m/s"
+    why = "The wheels begin to dig: mean slip of the wheels is 41 %, at 0.31 m/s"
     happened = tuple(
         [Event("outlier", float(i), i + 0.9, "a row that fits nothing") for i in range(60)]
         + [Event("immobilization", 70.0, 70.2, why)]

@@ -63,7 +63,7 @@ def test_the_ground_says_what_it_needs(tmp_path: Path, capfd: pytest.CaptureFixt
     assert main(["ground", str(path), "-o", str(tmp_path / "ground.json")]) == 2
     text = capfd.readouterr().err.strip().splitlines()
     assert len(text) == 1
-    assert "holds slip but no adhesion" in text[0]
+    assert "has slip but no adhesion" in text[0]
     assert "estimate a log with torques" in text[0]
     assert not (tmp_path / "ground.json").exists()
 

@@ -132,7 +132,7 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
     """soils.json holds all that the tables and the drawn curves say: one curve, whoever shows it."""
     Campaign({one.name: one.learned for one in curves}, {}, ()).library().write(tmp_path / "soils.json")
     campaign = known_soils(SoilLibrary.load(tmp_path / "soils.json"), ["hard", "fine", "clay"])
-    assert campaign.not_fitted == {"clay": "the library does not hold it"}
+    assert campaign.not_fitted == {"clay": "the library does not contain it"}
     shown = soil_sections.curves_of_all(campaign)
     fresh = soil_sections.curves_of_all(Campaign({one.name: one.learned for one in curves}, {}, ()))
     for mine, theirs in zip(

@@ -141,7 +141,7 @@ def test_a_fit_that_was_read_has_the_band_of_its_one_parameter_or_the_written_on
     library = SoilLibrary({"one": Soil.from_curve("one", fitted), "many": Soil.from_curve("many", wide)})
     read = known_soils(library, ["one", "many", "none"])
     one, many = read.soils["one"].curve, read.soils["many"].curve
-    assert read.not_fitted == {"none": "the library does not hold it"}
+    assert read.not_fitted == {"none": "the library does not contain it"}
     low, high = one.band(SLIP)
     for edge, a in zip((low, high), fitted.interval_["a"], strict=True):
         np.testing.assert_allclose(edge, CURVES["exponential"].value(SLIP, {"a": a}))
@@ -290,4 +290,4 @@ def test_forms_take_part_that_leave_two_bins_free(levels: int, forms: int) -> No
         return
     verdict = compare_forms(bins)
     assert len(verdict.ranking) == forms
-    assert ("cannot tell forms" in verdict.sentence) is (len(verdict.ranking) < len(FORMS))
+    assert ("cannot distinguish forms" in verdict.sentence) is (len(verdict.ranking) < len(FORMS))

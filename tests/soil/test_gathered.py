@@ -125,7 +125,7 @@ def test_a_file_given_twice_and_slip_without_adhesion_are_refused(tmp_path: Path
     bare = run_of(1)
     for wheel in ("l", "r", "x", "y"):
         del bare.columns[f"adhesion_{wheel}"]
-    with pytest.raises(InputError, match="one: holds slip but no adhesion"):
+    with pytest.raises(InputError, match="one: has slip but no adhesion"):
         GatheredRuns().add(bare, "one")
 
 

@@ -178,4 +178,4 @@ def test_a_curve_that_explains_nothing_is_not_a_soil():
         columns[f"adhesion_{w}"] = 0.4 - 0.3 * columns[f"slip_{w}"] + 0.05 * rng.standard_normal(6000)
     campaign = learn_soils(usable_pairs(columns, WHEELS, 2.6, "run"))
     assert set(campaign.not_fitted) == {"fine", "coarse"}
-    assert "explains nothing" in campaign.not_fitted["fine"]
+    assert "does not explain" in campaign.not_fitted["fine"]

@@ -43,7 +43,7 @@ def test_a_number_that_is_none_is_not_written(tmp_path, wrong):
     paper_soils().write(path)
     before = path.read_bytes()
     for soil in (Soil("x", "exponential", {"a": wrong}), Soil("x", "exponential", {"a": 1.0}, r2=wrong)):
-        with pytest.raises(InputError, match=r"soils\.json: a number of a soil is none"):
+        with pytest.raises(InputError, match=r"soils\.json: a number of a soil is not one"):
             SoilLibrary({"x": soil}).write(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]

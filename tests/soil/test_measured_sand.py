@@ -62,7 +62,7 @@ def test_the_intercept_form_is_not_flagged(bins):
 def test_five_levels_do_not_judge_forms_of_four_parameters(bins):
     verdict = compare_forms(bins)
     assert {score.parameters for score in verdict.ranking} == {1, 2, 3}
-    assert "5 slip bins cannot tell forms of more than 3 parameters" in verdict.sentence
+    assert "5 slip bins cannot distinguish forms of more than 3 parameters" in verdict.sentence
     with pytest.raises(InputError, match="too few to compare"):
         compare_forms(bins, asked="pacejka")
 

@@ -33,7 +33,7 @@ def test_neighbouring_bins_without_pairs_are_one_stretch() -> None:
     everywhere = bins_of(*(0.075 + 0.05 * np.arange(9)))
     assert missing_slips(everywhere) == []
     assert in_words("clay", what_to_drive(FALLING, everywhere, 1000.0, 0.01, 4)) == [
-        "clay: every slip bin holds enough samples."
+        "clay: every slip bin has enough samples."
     ]
 
 
@@ -70,7 +70,7 @@ def test_the_words_name_slip_pull_speed_and_time() -> None:
     assert f"past {pulls[2]:.0f} N at about 1.2 m/s wheel speed and log" in high
     heavy = Soil("bog", FALLING.model, FALLING.parameters, resistance=(0.4, 0.1))
     assert (
-        "below the pull that rolling takes" in in_words("bog", what_to_drive(heavy, bins, 1000.0, 0.1, 4))[0]
+        "below the pull needed for rolling" in in_words("bog", what_to_drive(heavy, bins, 1000.0, 0.1, 4))[0]
     )
     short = in_words("clay", what_to_drive(FALLING, bins, 1000.0, 0.1, 4))[0]
     assert short.endswith("N, at least 1 s in all, in two runs or more.")

@@ -95,7 +95,7 @@ def test_gaps_in_words() -> None:
     assert "raise the pull past 310 N at about" in in_words("s", [replace(gap, reachable=False)])[0]
     for most in (0.0, -3.0):
         assert "drive without a tool, or be pushed" in in_words("s", [replace(gap, pull=(-20.0, most))])[0]
-    assert in_words("s", []) == ["s: every slip bin holds enough samples."]
+    assert in_words("s", []) == ["s: every slip bin has enough samples."]
 
 
 def test_libraries_compare_over_five_to_sixty_per_cent_of_slip() -> None:

@@ -182,7 +182,7 @@ def test_a_map_is_made_as_a_job(client: TestClient, maps: Path, run: str, state:
         job = client.get(f"/api/jobs/{job['id']}").json()
     assert job["state"] == state, job
     if state == "failed":
-        assert job["text"].startswith("nowhere.parquet: holds no positions")
+        assert job["text"].startswith("nowhere.parquet: has no positions")
         assert not (maps / "new.gpkg").exists()
     else:
         about = client.get("/api/map", params={"path": "new.gpkg"}).json()

@@ -23,7 +23,7 @@ SOFT = 0.08
 """Soil resistance from which a lower tyre pressure is worth trying."""
 PRESSURE = (
     "Try a lower tyre pressure, within what the tyre's maker allows for load and speed.",
-    "A longer contact patch lowers rolling resistance and raises grip on soft ground. How much, this drive cannot tell: drive the same "
+    "A longer contact patch lowers rolling resistance and raises grip on soft ground. This drive cannot show how much: drive the same "
     "stretch at both pressures and compare.",
 )
 
@@ -87,8 +87,8 @@ def _load(work: Work, vehicle: Vehicle) -> list[Action]:
     if low <= float(np.mean(work.slip)) <= high or gain < WORTH or interval[0] < 0:
         return [
             Action(
-                f"Keep the load: no other is certain to be better; slip is best at {work.best.slip:.1%} ({low:.1%} to {high:.1%}).",
-                "The mean slip lies within the interval of the best one, or what another load would gain is small or not certain: "
+                f"Keep the load: no other is certainly better; slip is best at {work.best.slip:.1%} ({low:.1%} to {high:.1%}).",
+                "The mean slip lies within the interval of the best one, or the gain by another load is small or uncertain: "
                 f"{100 * gain:.1f} points of efficiency ({100 * interval[0]:.1f} to {100 * interval[1]:.1f}).",
             )
         ]  # fmt: skip
@@ -123,17 +123,15 @@ def _ballast(work: Work, vehicle: Vehicle) -> list[Action]:
     mass = abs(change) * vehicle.mass
     what = (
         f"{'Add' if change > 0 else 'Take off'} about {_round(mass)} kg of ballast if the load stays as it is"
-        f"{'' if change > 0 else ', as far as it carries so much'}"
+        f"{'' if change > 0 else ', as far as it carries that much'}"
     )
-    what += ", spread so that the axles keep their shares." if len(vehicle.axles) > 1 else "."
+    what += ", distributed so that the axles keep their shares." if len(vehicle.axles) > 1 else "."
     why = (
-        "The pull asks for more grip than the weight gives at the best slip."
+        "The pull needs more grip than the weight gives at the best slip."
         if change > 0
         else "The machine is heavier than this pull needs: weight that rolls costs power. Keep what steering, lifting and slopes need."
     )
-    return [
-        Action(what, why + " Adhesion and resistance per load are taken as they are now.", gain, interval)
-    ]
+    return [Action(what, why + " Adhesion and resistance per load are assumed unchanged.", gain, interval)]
 
 
 def _drive_more_axles(work: Work, vehicle: Vehicle) -> list[Action]:
@@ -155,10 +153,10 @@ def _speed(work: Work, vehicle: Vehicle) -> list[Action]:
         return []
     fastest = vehicle.power * best.efficiency / (best.net_traction * vehicle.mass * STANDARD_GRAVITY)
     if fastest < 0.95 * work.speed:
-        what = f"At the advised load drive no faster than {fastest:.2g} m/s ({3.6 * fastest:.2g} km/h): the power ends there."
+        what = f"At the advised load drive no faster than {fastest:.2g} m/s ({3.6 * fastest:.2g} km/h): that is the limit of the power."
     else:
         what = f"The power allows up to {fastest:.2g} m/s ({3.6 * fastest:.2g} km/h) at the advised load; {work.speed:.2g} m/s were driven."
-    why = "Slip follows the pull, not the speed, while draught does not grow with it: beyond the best slip, gain by speed, not by load."
+    why = "While draught does not grow with speed, slip follows the pull alone: beyond the best slip, increase speed, not load."
     return [Action(what, why)]
 
 

@@ -46,7 +46,7 @@ def advise(
         return {"": advise_slip(tables, vehicle)}, {"": 0.0}
     if not all(one.has_adhesion for one in tables):
         raise InputError(
-            "some of the estimates hold slip alone, others adhesion too", hint="advise on each kind by itself"
+            "some of the estimates have slip alone, others adhesion too", hint="advise on each kind by itself"
         )
     vehicle = machine_of(tables[0], vehicle)
     for one in tables:
@@ -108,7 +108,7 @@ def _of_soil(
     beyond = known is not None and power.slip > curves.reach
     if beyond:
         missing.append(
-            f"the library's curve was learned at slips up to {curves.reach:.0%}: where most pull power lies beyond them rests on the "
+            f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
             "form of the curve alone; learn it from drives with harder pulls"
         )
     if soils and known is None:
@@ -139,24 +139,24 @@ def _known(best: Best, over: OverSlip) -> bool:
 
 
 def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, measured: bool) -> list[str]:
-    """What is not known and what would tell it; ``measured``: the fuel was."""
+    """What is not known and what would show it it; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
     if not _known(best, curves.over):
         missing.append(
-            f"the best slip is only known as {low:.0%} to {high:.0%}: drive longer, at pulls that slip up to 15 %, "
+            f"the best slip is only known to be {low:.0%} to {high:.0%}: drive longer, at pulls that slip up to 15 %, "
             "and calibrate the wheel radius"
         )
     elif best.slip > FARTHEST * curves.reach:
         missing.append(
-            f"the drive reaches {curves.reach:.0%} of slip; the best slip of {best.slip:.0%} rests on how soils behave in "
+            f"the drive reaches {curves.reach:.0%} of slip; the best slip of {best.slip:.0%} follows from how soils behave in "
             "general: pull harder "
             f"to see it"
         )
     if power.interval[1] - power.interval[0] > WIDEST_POWER:
         missing.append(
-            f"where most pull power lies is only known as {power.interval[0]:.0%} to {power.interval[1]:.0%} of slip: a drive with "
-            f"pulls up to about {power.slip:.0%} of slip would tell"
+            f"the slip of most pull power is only known to be {power.interval[0]:.0%} to {power.interval[1]:.0%} of slip: a drive with "
+            f"pulls up to about {power.slip:.0%} of slip would show it"
         )
     for key, unit in (
         ("working_width", "ha/h"),

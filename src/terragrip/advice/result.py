@@ -97,13 +97,13 @@ def advised_slip(path: str | os.PathLike[str]) -> float:
             f"cannot be read ({error.strerror})", file=path, hint="terragrip advise writes it"
         ) from None
     except (ValueError, TypeError, LookupError):
-        raise InputError("is no advice.json", file=path, hint="terragrip advise writes it") from None
+        raise InputError("is not an advice.json", file=path, hint="terragrip advise writes it") from None
     if slip is None:
         raise InputError(
             "advises no slip",
             file=path,
             place="best_efficiency",
-            hint="its 'missing' says which drive would tell",
+            hint="its 'missing' says which drive would show it",
         )
     return slip
 
@@ -162,7 +162,7 @@ def _field(work: Mapping[str, float]) -> list[str]:
     """ha/h, l/h and l/ha as driven, and their values at the best slip."""
     units = {
         "hectares_per_hour": "ha/h", "litres_per_hour": "l/h", "litres_per_hectare_measured": "l/ha measured",
-        "litres_per_hectare": "l/ha reckoned from the pull",
+        "litres_per_hectare": "l/ha computed from the pull",
     }  # fmt: skip
     better = {
         "hectares_per_hour": ("hectares_per_hour_at_best", "at the best slip and this wheel speed"),
@@ -186,7 +186,7 @@ def _shares(drive: Mapping[str, float]) -> list[str]:
     below, within, above = (share_words(drive, name) for name in ("below", "within", "above"))
     return [
         f"  slip within the usual {band} in {within} of the driving time, below in {below}, above in {above}; "
-        "in parentheses 95 %, by what slip's zero leaves open"
+        "in parentheses the 95 % interval from the zero of slip"
     ]
 
 

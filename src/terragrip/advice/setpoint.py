@@ -58,7 +58,9 @@ class SlipSetpoint:
 
     def __init__(self, vehicle: Vehicle, slip: float, speed: float, limits: Limits | None = None) -> None:
         if not 0 < slip < 0.6:
-            raise InputError(f"the slip {slip:g} is no set-point", hint="give more than 0 and less than 0.6")
+            raise InputError(
+                f"the slip {slip:g} is not a set-point", hint="give more than 0 and less than 0.6"
+            )
         if not (speed > 0 and math.isfinite(speed)):
             raise InputError(f"the speed {speed:g} m/s is not forward", hint="give a positive speed in m/s")
         self.slip, self.speed, self.limits = slip, speed, limits or Limits()

@@ -25,7 +25,7 @@ SHIFTS = np.linspace(-1.96, 1.96, 41)
 SUREST = 0.05
 """Quantile of the rows' SDs of slip that stands for the zero's."""
 REMEDY = (
-    "drive 40 s without load on a road, faster than 5 m/s, or say which rows are without load on firm ground "
+    "drive 40 s without load on a road, faster than 5 m/s, or state which rows are without load on firm ground "
     "(terragrip calibrate --light FROM:TO)"
 )
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -126,7 +126,7 @@ def _actions(drive: Mapping[str, float], cost: str) -> tuple[tuple[Action, ...],
         actions.append(
             Action(
                 "If this was heavy draught work: take ballast off, or load more (deeper, wider).",
-                f"Slip is below {low:.0%} in {below} of the driving time: it is heavier than its pull needs. On light work, on "
+                f"Slip is below {low:.0%} in {below} of the driving time: the machine is heavier than its pull needs. On light work, on "
                 "the road and in transport low slip is right.",
             )
         )
@@ -134,7 +134,7 @@ def _actions(drive: Mapping[str, float], cost: str) -> tuple[tuple[Action, ...],
         return tuple(actions), ()
     if drive["share_above_high"] > OFTEN or drive["share_below_high"] > MOSTLY:
         return (), (
-            f"slip is known to ± {196 * drive['slip_std']:.1f} points only, too little to advise by: it is above {high:.0%} in "
+            f"slip is known to ± {196 * drive['slip_std']:.1f} points only, not enough for advice: it is above {high:.0%} in "
             f"{drive['share_above_low']:.0%} to {drive['share_above_high']:.0%} of the time, below {low:.0%} in "
             f"{drive['share_below_low']:.0%} to {drive['share_below_high']:.0%}; {REMEDY}",
         )

@@ -192,7 +192,7 @@ class Extra:
             except InputError as error:
                 no_map = _in_one_line(str(error))
             else:
-                no_map = "" if cells is not None else "holds no positions"
+                no_map = "" if cells is not None else "has no positions"
                 tables |= {} if cells is None else {"cells": cells}
         if settings.ground:
             from terragrip.fleet.ground import ground_of_log

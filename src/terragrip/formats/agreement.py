@@ -53,7 +53,7 @@ class Agreement:
         if both and all(self._evidence.size(g.column.column) < 3.2 for g in both):
             for channel in ("latitude", "longitude"):
                 ranked[channel] = [
-                    replace(g, unit="rad", unit_doubt="its size tells radians")
+                    replace(g, unit="rad", unit_doubt="its magnitude suggests radians")
                     if g.column.unit is None
                     else g
                     for g in ranked.get(channel, [])
@@ -131,7 +131,7 @@ class Agreement:
                     and not read.has("ground")
                     and not judged.doubt
                 ):
-                    judged = replace(judged, doubt="a vehicle's speed may be made of its wheels")
+                    judged = replace(judged, doubt="a vehicle's speed may be computed from its wheels")
                 return judged if finding.agrees else replace(judged, confidence=0.3 * guess.confidence)
         return guess
 
@@ -145,7 +145,7 @@ class Agreement:
             }
             ranked["ground_speed"] = [
                 replace(
-                    g, confidence=max(g.confidence, 0.75), evidence=(*g.evidence, "named as the latitude is")
+                    g, confidence=max(g.confidence, 0.75), evidence=(*g.evidence, "named like the latitude")
                 )
                 if g.column.name.words[:1] in prefixes and len(g.column.name.words) > 1
                 else g
@@ -172,7 +172,7 @@ class Agreement:
                 continue
             result = self._evidence.ratio(best.column.column, guess.column.column)
             if result is not None and result[1] > 0.5 and 0.6 < result[0] < 1.4:
-                sentence = f"goes with {best.column.column}, of which it is {1 / result[0]:.3g} times"
+                sentence = f"varies with {best.column.column}, of which it is {1 / result[0]:.3g} times"
                 kept.append(
                     replace(
                         guess,
@@ -218,7 +218,7 @@ class Agreement:
             if result is not None and result[1] > 0.6:
                 unit = nearest_unit(result[0], {"m/s^2": 1.0, "g": 1 / 9.80665}, 0.35)
                 plain = guess.column.unit is not None or guess.unit == unit
-                sentence = f"goes with the derivative of {ground[0]} (correlation {result[1]:.2f})"
+                sentence = f"varies with the derivative of {ground[0]} (correlation {result[1]:.2f})"
                 guess = guess.with_finding(
                     Finding(True, sentence, unit if not plain or guess.column.unit is None else None)
                 )
@@ -240,7 +240,7 @@ class Agreement:
                 unit = nearest_unit(abs(result[0]), RATE_UNITS, 0.3)
                 if unit is None:
                     continue
-                sentence = f"goes with the rate of turn by {source} (correlation {result[1]:.2f})"
+                sentence = f"varies with the rate of turn by {source} (correlation {result[1]:.2f})"
                 judged_once = guess.with_finding(Finding(True, sentence, unit))
                 guess = replace(
                     judged_once,

@@ -47,7 +47,7 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             lacking = next((c for c in every if not matching(c, log.columns)), every[0])
             raise _missing(lacking, log, others=len(origin.chain) > 1 or len(origin.candidates) > 1)
     if absent and not partial:
-        notes.append(f"Nothing in the log gives {', '.join(absent)}; the profile can do without.")
+        notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")
     time, rows = profile.time, profile.rows
     if time.column not in log.columns:
         if not log.clocked:
@@ -71,7 +71,7 @@ def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:
         return time, []
     if "unit" not in time.model_fields_set:
         return time.model_copy(update={"unit": stated}), []
-    sentence = f"The log states {stated} for {time.column}; the profile's {time.unit} counts."
+    sentence = f"The log states {stated} for {time.column}; the profile's {time.unit} is used."
     return time, [] if same else [sentence]
 
 
@@ -110,5 +110,5 @@ def _missing(column: str, log: LogTable, *, others: bool = False) -> InputError:
     hint = how_to_pivot(log.names) or hint
     problem = "is missing, but the profile names it"
     if others:
-        problem += ", and so are the others that would do"
+        problem += ", and so are its alternatives"
     return InputError(problem, file=log.source, place=f"column {column}", hint=hint)

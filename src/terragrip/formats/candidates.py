@@ -168,7 +168,7 @@ def _of_motion(column: Column) -> list[Hint]:
             return []
         if axis:
             return [(f"acceleration_{axis}", 0.8 if name.axis else 0.6, "an acceleration and an axis")]
-        return [("acceleration_x", 0.4, "an acceleration, along which axis is not said")]
+        return [("acceleration_x", 0.4, "an acceleration, along an unknown axis")]
     if name.has("rate") and about and not axis:
         return [(f"angular_velocity_{about}", 0.85, "the rate of an angle")]
     of_wheels = name.has("odometry")
@@ -191,7 +191,7 @@ def _of_motion(column: Column) -> list[Hint]:
         and not name.wheel
         and not _in_turns(column.unit)
     ):
-        return [("angular_velocity_z", 0.3, "turns, of what is not said")]
+        return [("angular_velocity_z", 0.3, "turns, of an unknown part")]
     if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position"):
         return [("pitch" if name.has("pitch") else "roll", 0.85, "its name")]
     return []
@@ -212,7 +212,7 @@ def _of_place(column: Column) -> list[Hint]:
     if name.has("mass") and not (
         name.strange or name.wheel or name.has("wheel", "front", "rear", "motor", "coupling")
     ):
-        return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of nothing less than the machine")]
+        return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in name.words)):
         return [("drawbar_force", 0.85, "a pull")]
     return []
@@ -234,19 +234,19 @@ def _of_speed(column: Column) -> list[Hint]:
     if name.has("odometry"):
         if not {"filtered", "filter", "fused", "ekf", "ukf"}.isdisjoint(name.words):
             return []  # of more than the wheels
-        return [("wheel_based_speed", 0.8, "odometry, which is made of the wheels")]
+        return [("wheel_based_speed", 0.8, "odometry, which is computed from the wheels")]
     if name.has("ground"):
         return [("ground_speed", 0.85, "a speed over ground")]
     if name.has("wheel"):
         score = 0.5 if name.has("front", "rear") else 0.85
         return [("wheel_based_speed", score, "a speed of the wheels as one")]
     if along and not name.has("body"):
-        return [("ground_speed", 0.4, "a velocity; wheel odometry is none over ground")]
+        return [("ground_speed", 0.4, "a velocity; wheel odometry is not over ground")]
     if name.axis == "x" or name.has("longitudinal"):
         return [("ground_speed", 0.65, "a speed along the vehicle")]
     return [
-        ("ground_speed", 0.55, "a speed, of what is not said"),
-        ("wheel_based_speed", 0.35, "a speed, of what is not said"),
+        ("ground_speed", 0.55, "a speed, of an unknown part"),
+        ("wheel_based_speed", 0.35, "a speed, of an unknown part"),
     ]
 
 

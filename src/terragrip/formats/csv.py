@@ -85,7 +85,9 @@ def _lines(source: str, size: int) -> Iterator[tuple[bytes, bool]]:
             end = data.rfind(b"\n") + 1
             rest = data[end:]
             if len(rest) > 4 * size:
-                raise InputError("has no line ends", file=source, hint="give a table of text, a row a line")
+                raise InputError(
+                    "has no line ends", file=source, hint="give a table of text, one row per line"
+                )
             if end:
                 yield data[:end], is_first
                 is_first = False

@@ -140,7 +140,9 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
         cells = len(split(line, separator))
         if cells != width:
             problem = f"has {cells} cells, the header {width}"
-            return InputError(problem, file=source, place=f"row {row}", hint="give every row as many cells")
+            return InputError(
+                problem, file=source, place=f"row {row}", hint="give every row the same number of cells"
+            )
     problem = f"is not a regular table ({str(error)[:80]})"
     return InputError(problem, file=source, hint="look for unbalanced quotes")
 

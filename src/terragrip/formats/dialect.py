@@ -63,7 +63,7 @@ def detect(data: bytes, source: str) -> Dialect:
     second = split(lines[1], separator) if len(lines) > 1 else []
     if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
         raise InputError(
-            "the first row holds numbers, not column names",
+            "the first row has numbers, not column names",
             file=source,
             hint="put a header row above the numbers",
         )

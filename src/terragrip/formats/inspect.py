@@ -33,8 +33,8 @@ from terragrip.vehicle import Vehicle
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (
-    "The log is long ({:.1f} GB): one of every {} blocks of its records was looked at, all over it. Counts and shares are of "
-    "these; gaps are not looked for."
+    "The log is long ({:.1f} GB): one of every {} blocks of its records was read, spread over the log. Counts and "
+    "shares refer to these; gaps are not searched for."
 )
 
 

@@ -159,14 +159,14 @@ class Judge:
                 return replace(
                     guess,
                     unit="deg",
-                    unit_doubt="" if sure else "the sizes tell degrees",
-                    evidence=(guess.why, "its size tells degrees"),
+                    unit_doubt="" if sure else "the magnitudes suggest degrees",
+                    evidence=(guess.why, "its magnitude suggests degrees"),
                 )
             return replace(guess, unit="rad", unit_doubt="no unit is stated: rad?")
         if guess.channel.startswith("wheel_speed_") and size > 40:
             return replace(guess, unit="rad/s", unit_doubt=f"reaches {size:.3g}: rpm or deg/s?")
         if target == "rad/s" and guess.channel.startswith("angular") and size > 12:
-            return replace(guess, unit="deg/s", evidence=(guess.why, "its size tells deg/s"))
+            return replace(guess, unit="deg/s", evidence=(guess.why, "its magnitude suggests deg/s"))
         return replace(guess, unit=target, unit_doubt=f"no unit is stated: {target}?")
 
 

@@ -108,7 +108,7 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
     walk(tree, "", contents, 0)
     notes = [*_notes(contents), *contents.notes]
     if not contents.signals and not contents.loose:
-        problem = "; ".join(["holds no numeric column", *(note.rstrip(".") for note in notes[:1])])
+        problem = "; ".join(["has no numeric column", *(note.rstrip(".") for note in notes[:1])])
         if contents.odd:
             problem = notes[0].rstrip(".")
         raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
@@ -143,7 +143,7 @@ def _notes(contents: Contents) -> list[str]:
         odd = _some([f"{name} ({own})" for name, (own, _) in contents.odd.items()])
         longs = sorted({length for _, length in contents.odd.values()})
         notes.append(
-            f"Of another length than the time vector beside them ({', '.join(map(str, longs[:3]))}), and left out: {odd}."
+            f"Signals of another length than the time vector beside them ({', '.join(map(str, longs[:3]))}) were left out: {odd}."
         )
     records = [name for name, kind in contents.opaque.items() if kind == IN_RECORDS]
     if records:
@@ -152,11 +152,11 @@ def _notes(contents: Contents) -> list[str]:
             f"it in MATLAB by save('log.mat', '{records[0].partition('.')[0]}', '-v7')."
         )
     if contents.signals and contents.loose:
-        notes.append(f"No time vector stands beside {_some(list(contents.loose))}, which were left out.")
+        notes.append(f"There is no time vector beside {_some(list(contents.loose))}, which were left out.")
     shown = [f"{n} ({kind})" if kind else n for n, kind in contents.opaque.items() if kind != IN_RECORDS]
     if shown:
         notes.append(
-            f"What is no series of plain numbers was left out: {_some(shown)}; save it from MATLAB as arrays or structs, a table by "
+            f"Not series of plain numbers, and left out: {_some(shown)}; save it from MATLAB as arrays or structs, a table by "
             "writetable(x, 'x.csv')."
         )
     return notes

@@ -102,7 +102,7 @@ def _clock_name(struct: Mapping[str, Any], name: str, contents: Contents) -> str
         if len(alike) > 1:
             alike.sort(key=lambda key: (not _runs_forward(struct[key]), key != word))
             others = ", ".join(_joined(name, key) for key in alike[1:])
-            contents.notes.append(f"{_joined(name, alike[0])} is taken for time; {others} is a signal.")
+            contents.notes.append(f"{_joined(name, alike[0])} is used as time; {others} is a signal.")
         if alike:
             return alike[0]
     return None

@@ -55,7 +55,7 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
                 if channels[record.id][1] is None:
                     unreadable[f"{record.topic} ({record.message_encoding})"] = None
     if unreadable:
-        notes.append(f"Topics in an encoding that is not known were left out: {', '.join(unreadable)}.")
+        notes.append(f"Topics in an unknown encoding were left out: {', '.join(unreadable)}.")
     return notes
 
 

@@ -129,7 +129,7 @@ class Topic:
         notes = []
         if self.strange:
             notes.append(
-                f"{self.name}: {self.strange} values are absent, or of another kind than in the first message."
+                f"{self.name}: {self.strange} values are absent, or of another type than in the first message."
             )
         if self.bad:
             notes.append(f"{self.name}: {self.bad} messages cannot be read and were left out.")
@@ -157,13 +157,13 @@ class Topic:
         if far.mean() > _QUICKEST and not _in_bursts(receipts, stamps):
             apart = float(np.ptp(delay))
             return receipts, [
-                f"{self.name}: its stamps wander by {apart:.3g} s against the recorder's clock; the times of receipt are used."
+                f"{self.name}: its stamps drift by {apart:.3g} s against the recorder's clock; the times of receipt are used."
             ]
         if abs(typical) <= _OTHER_CLOCK:
             return stamps, []
         offset = float(np.quantile(delay, _QUICKEST))
         instant = (
-            f"{self.name} is stamped {offset:.3f} s off the recorder's clock; the stamps were moved onto it."
+            f"{self.name} is stamped {offset:.3f} s off the recorder's clock; the stamps were shifted to it."
         )
         return stamps + offset, [instant]
 
@@ -250,7 +250,7 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
         names |= dict.fromkeys(topic.names)
     if not any(topic.count for topic in topics):
         bad = sum(topic.bad for topic in topics)
-        problem = f"holds no message that can be read ({bad} cannot)" if bad else "holds no message"
+        problem = f"has no readable message ({bad} are unreadable)" if bad else "holds no message"
         raise InputError(
             f"{problem}{'; ' + remarks[0] if remarks else ''}", file=path, hint="check how it was recorded"
         )

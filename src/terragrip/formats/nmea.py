@@ -74,7 +74,7 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
                     _add(sentence, track)
     if not track.columns:
         problem = (
-            f"holds no usable RMC, VTG or GGA sentence ({track.bad} damaged, {track.no_fix} without a fix)"
+            f"has no usable RMC, VTG or GGA sentence ({track.bad} damaged, {track.no_fix} without a fix)"
         )
         raise InputError(problem, file=path, hint="check that the receiver sent them, and had a fix")
     notes = []

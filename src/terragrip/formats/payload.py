@@ -34,7 +34,7 @@ class Payload(Part):
                 "packed numbers need names", "write 'fields: [time, ...]' in their order", ("fields",)
             )
         if (self.format == "struct") != bool(self.layout):
-            raise Fault("layout goes with format struct", "write e.g. 'layout: d4f'", ("layout",))
+            raise Fault("layout needs format struct", "write e.g. 'layout: d4f'", ("layout",))
         packer = self.packer
         if packer.size > _LONGEST:
             raise Fault(
@@ -42,9 +42,7 @@ class Payload(Part):
             )
         count = len(packer.unpack(bytes(packer.size)))
         if count != len(self.fields):
-            raise Fault(
-                f"the layout holds {count} numbers, not {len(self.fields)}", "correct one", ("layout",)
-            )
+            raise Fault(f"the layout has {count} numbers, not {len(self.fields)}", "correct one", ("layout",))
         return self
 
     @property
@@ -54,4 +52,4 @@ class Payload(Part):
         try:
             return struct.Struct(_ORDER[self.byte_order] + layout)
         except struct.error as error:
-            raise Fault(f"is no layout ({error})", "write e.g. 'd4f'", ("layout",)) from error
+            raise Fault(f"is not a layout ({error})", "write e.g. 'd4f'", ("layout",)) from error

@@ -77,7 +77,7 @@ class Profile(Part):
         name = os.fspath(path)
         if not Path(path).exists() and Path(path).parent == Path() and not Path(path).suffix:
             hint = suggestion(name, SHIPPED, f"those are {', '.join(SHIPPED)}")
-            raise InputError(f"{name!r} is no file, and no profile that comes with Terragrip", hint=hint)
+            raise InputError(f"{name!r} is neither a file nor a profile that comes with Terragrip", hint=hint)
         result = validate(cls, read_yaml(path))
         here = Path(path).parent
         return result.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in result.dbc)})
@@ -109,7 +109,7 @@ class Profile(Part):
         for name, source in self.channels.items():
             if name == TIME:
                 raise Fault(
-                    "time is no channel",
+                    "time is not a channel",
                     "write it as 'time: {from: ...}' beside channels",
                     ("channels", name),
                 )

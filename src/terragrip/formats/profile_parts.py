@@ -74,13 +74,13 @@ class Source(Part):
             raise Fault("needs exactly one source", hint)
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
-                raise Fault("serves derivative_of only", "leave it out", (key,))
+                raise Fault("works with derivative_of only", "leave it out", (key,))
         if self.over is not None and self.column is None:
             raise Fault("serves from only", "leave it out", ("over",))
         if self.over is not None and self.over_minimum <= 0:
             hint = "write e.g. 'over_minimum: 0.3', in the divisor's unit"
             raise Fault(
-                "needs a positive over_minimum, since a quotient over next to nothing is noise",
+                "needs a positive over_minimum, since a quotient by nearly zero is noise",
                 hint,
                 ("over",),
             )

@@ -17,24 +17,22 @@ _LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
 
 def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
     """What is not among the channels that were found, and what follows, as sentences."""
-    notes = [] if has_time else ["No time column was found: it is needed, in seconds that run forward."]
+    notes = [] if has_time else ["No time column was found: it is needed, in increasing seconds."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
         notes.append(
-            "No wheel speed was found, nor a drive train's (wheel_based_speed): nothing can be estimated without. A motor's speed "
+            "No wheel speed was found, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
             "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
     if "ground_speed" not in proposals:
-        notes.append(
-            "No ground speed was found: there is no slip and no resistance without; positions will do."
-        )
+        notes.append("No ground speed was found: slip and resistance need it; positions will do.")
     if not wheels and "wheel_based_speed" not in proposals:
         return notes  # nothing else matters
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
     if len(without) == len(wheels):
         notes.append(
-            "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be had; adhesion, soil "
-            "resistance, net traction and efficiency cannot, and no soil can be learned."
+            "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, "
+            "soil resistance, net traction, efficiency and soil curves cannot."
         )
         return notes
     notes += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
@@ -46,7 +44,7 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
         )
     if "pitch" not in proposals:
         notes.append(
-            "No pitch was found: the ground is taken as level, and a slope reads as soil resistance."
+            "No pitch was found: the ground is assumed level, and a slope appears as soil resistance."
         )
     return notes
 

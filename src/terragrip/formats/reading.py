@@ -118,7 +118,7 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
         raise InputError(
             f"is a {own.title}, which its format does not read",
             file=path,
-            hint="update the package that brings it",
+            hint="update the package that provides it",
         )
     return table.whole(wanted)
 

@@ -121,7 +121,7 @@ def _left_out(
         if channel == "ground_speed" or channel.startswith("wheel_speed_"):
             unit = f" in {best.unit}" if best.unit else ""
             yield (
-                f"{best.column.column}{unit} goes by the name of {_in_the_vehicle(channel, vehicle)}, but {best.doubt}: check its unit."
+                f"{best.column.column}{unit} has the name of {_in_the_vehicle(channel, vehicle)}, but {best.doubt}: check its unit."
             )
 
 
@@ -144,7 +144,7 @@ def silent(
         if guess.channel.startswith(("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_")):
             known = values[np.isfinite(values)]
             held = f"is {known[0]:.4g} throughout" if len(known) else "has no value"
-            notes.append(f"{name} goes by the name of {guess.channel}, but {held}.")
+            notes.append(f"{name} has the name of {guess.channel}, but {held}.")
     return notes[:6]
 
 
@@ -181,7 +181,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
     if channel.startswith("drive_torque_") and kind in ("current", None) and guess.column.name.has("current"):
         entry |= {"scale": 1.0, "unit": "N m"} if guess.column.unit else {"scale": 1.0}
         side = " times the gear ratio" if guess.column.name.has("motor") else ""
-        give = f"a current: the scale in N m per A{side} is yours to give"
+        give = f"a current: the scale in N m per A{side} must be given by you"
     elif channel.startswith("wheel_speed_") and kind == "speed" and unit is not None:
         radius = radius_of(vehicle, channel.removeprefix("wheel_speed_"))
         entry |= {"scale": float(f"{factor_to(unit, 'm/s') / (radius or 1.0):.6g}"), "unit": "rad/s"}

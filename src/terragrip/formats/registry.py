@@ -73,13 +73,13 @@ def formats() -> dict[str, Format]:
     """The registered formats by name, ours first; raises InputError where one of another package cannot be loaded, or takes a name."""
     result = dict(_own())
     for entry in entry_points(group=GROUP):
-        place, hint = f"format {entry.name}", f"update or remove the package that brings {entry.value}"
+        place, hint = f"format {entry.name}", f"update or remove the package that provides {entry.value}"
         try:
             one = entry.load()
         except (ImportError, AttributeError) as error:
             raise InputError(f"cannot be loaded ({error})", place=place, hint=hint) from error
         if not isinstance(one, Format) or one.name in result:
-            problem = f"{entry.value} is no Format" if not isinstance(one, Format) else "is there already"
+            problem = f"{entry.value} is not a Format" if not isinstance(one, Format) else "is there already"
             raise InputError(problem, place=place, hint=hint)
         result[one.name] = one
     return result

@@ -65,9 +65,9 @@ class RimUnit:
     def sentence(self, radius: float) -> str:
         """What was found, by the ``radius`` [m] of a wheel."""
         if not self.possible:
-            return f"with a radius of {radius:.3g} m the rims are as fast as {self.ground} in no unit"
+            return f"with a radius of {radius:.3g} m the rims are not as fast as {self.ground} in any unit"
         parts = [f"{1 / share:.2f} times in {unit}" for unit, share in self.possible.items()]
-        axles = ", as the unequal wheels of two axles tell, too" if self.told_by_axles else ""
+        axles = ", as the unequal wheels of two axles also show" if self.told_by_axles else ""
         only = ", in no other unit near it" if self.is_sure and not self.told_by_axles else ""
         return f"with a radius of {radius:.3g} m the rims go as fast as {self.ground} {' or '.join(parts)}{only}{axles}"
 

@@ -129,7 +129,7 @@ class Rims:
                 return None
             return Finding(
                 True,
-                f"{ground} makes {rolled:.3g} m a radian: the gear ratio is the wheel's radius over that",
+                f"{ground} moves {rolled:.3g} m per radian: the gear ratio is the wheel's radius over that",
             )
         if guess.column.unit is not None:
             if guess.column.kind == "speed":
@@ -204,7 +204,7 @@ class Rims:
             if low <= abs(result[0]) <= high:
                 return
             size = f"{abs(result[0]):.2g} " + ("wheel radii" if kind == "rotation" else "m")
-            finding = Finding(False, f"in a turn by {source} they make a track of {size}")
+            finding = Finding(False, f"in turns by {source} they give a track of {size}")
             for channel, guess in ((left, first), (right, second)):
                 ranked[channel][ranked[channel].index(guess)] = guess.with_finding(finding)
             return

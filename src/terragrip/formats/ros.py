@@ -44,7 +44,7 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
             if topic.is_wanted:
                 topic.push(receipt, content, form)
     if lost:
-        notes.append(f"{lost} messages are of connections that are not described, and were left out.")
+        notes.append(f"{lost} messages are of undescribed connections were left out.")
     return log_of(topics.values(), path, [*types.notes(), *notes])
 
 
@@ -76,7 +76,7 @@ def _files_of(path: str) -> list[Path]:
     hint = (
         f"unpack {packed[0]} first (zstd -d)" if packed else "name the bag's folder, with .db3 or .mcap files"
     )
-    raise InputError("holds no bag file", file=path, hint=hint)
+    raise InputError("has no bag file", file=path, hint=hint)
 
 
 def _collect(

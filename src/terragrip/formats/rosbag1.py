@@ -55,7 +55,7 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Connection | Message
         if kind in (_MESSAGE, _CONNECTION):
             yield _record(kind, fields, content)
     if damaged:
-        notes.append(f"{damaged} chunks are damaged; what of them cannot be read was left out.")
+        notes.append(f"{damaged} chunks are damaged; their unreadable parts were left out.")
 
 
 def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | None:

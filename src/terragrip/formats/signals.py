@@ -67,7 +67,7 @@ class SignalLog:
         if not len(base):
             if self.signals:
                 raise InputError(
-                    "holds no sample of any known signal", file=self.source, hint="check that it was recorded"
+                    "has no sample of any known signal", file=self.source, hint="check that it was recorded"
                 )
             return LogTable((TIME, *self.names), {}, {}, self.source, self.sha256, tuple(notes), clocked=True)
         place = dict(zip(orders, rows, strict=True))
@@ -75,7 +75,7 @@ class SignalLog:
         base -= base[0]
         doubled = sum(int(np.sum(row[1:] == row[:-1])) for row in rows)
         if doubled:
-            notes.append(f"{doubled} samples repeat the instant of the one before them and take its place.")
+            notes.append(f"{doubled} samples repeat the time of the one before and replace it.")
         units = {name: s.unit for name, s in self.signals.items() if s.unit}
         columns: dict[str, npt.NDArray[Any]] = {TIME: base}
         for name in list(self.signals):

@@ -44,7 +44,7 @@ def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, t
             notes += _of_numbers(name, cells)
             if not notes and not timed and read.has("time") and any(cells):
                 first = next(row for row, cell in enumerate(cells) if cell)
-                notes.append(f"column {name}, row {first + 1}: {cells[first]!r} is no time; {FORMS}.")
+                notes.append(f"column {name}, row {first + 1}: {cells[first]!r} is not a time; {FORMS}.")
     return notes[:_LISTED] + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
 
 
@@ -73,12 +73,12 @@ def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:
         return
     bad = next(((row, cell) for row, cell in known if not good[cell]), None)
     if bad is None:
-        yield f"column {name} holds numbers with a decimal comma as texts: write numbers."
+        yield f"column {name} has numbers with a decimal comma as texts: write numbers."
         return
     count = sum(not good[cell] for _, cell in known)
     others = f" (and {count - 1} more)" if count > 1 else ""
     problem, hint = complaint(bad[1]) or (
-        f"{bad[1][:30]!r} is not a number, as most cells there are",
+        f"{bad[1][:30]!r} is not a number, though most cells there are",
         "leave it empty, or correct it",
     )
     yield f"column {name}, row {bad[0] + 1}{others}: {problem}; {hint}."

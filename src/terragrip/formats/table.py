@@ -131,7 +131,7 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         column = column.cast(pa.int8())
     elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
         raise InputError(
-            f"holds {kind}, not numbers", file=source, place=f"column {name}", hint="give one number a row"
+            f"has {kind}, not numbers", file=source, place=f"column {name}", hint="give one number per row"
         )
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64())

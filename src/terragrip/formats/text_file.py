@@ -54,8 +54,10 @@ def read(stream: BinaryIO, size: int, source: str) -> bytes:
         raise unreadable(source, error) from error
     if stream.tell() > most:
         packed = os.path.getsize(source)
-        problem = f"unpacks to more than {most / 1e6:.0f} MB from {packed / 1e6:.3g} MB, which no log does"
-        raise InputError(problem, file=source, hint="if it is one, unpack it with 'gunzip' and give the text")
+        problem = f"unpacks to more than {most / 1e6:.0f} MB from {packed / 1e6:.3g} MB, unlike any log"
+        raise InputError(
+            problem, file=source, hint="if it is a log, unpack it with 'gunzip' and give the text"
+        )
     return data
 
 

@@ -43,7 +43,9 @@ def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> Log
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
             problem = f"has {len(row)} cells, the header {len(names)}"
-            raise InputError(problem, file=path, place=f"row {number}", hint="give every row as many cells")
+            raise InputError(
+                problem, file=path, place=f"row {number}", hint="give every row the same number of cells"
+            )
     columns: dict[str, npt.NDArray[Any]] = {}
     for k, name in enumerate(names):
         if wanted is None or wanted(name):
@@ -76,7 +78,7 @@ def _column(name: str, cells: list[str], path: str) -> npt.NDArray[np.float64]:
         except ValueError:
             place = f"column {name}, row {k + 1}"
             raise InputError(
-                f"{cell!r} is not a number", file=path, place=place, hint="leave the row out"
+                f"{cell!r} is not a number", file=path, place=place, hint="remove the row"
             ) from None
     bare = name.lstrip("_").lower()
     if bare == "time":

@@ -144,7 +144,7 @@ def _notes(
         notes.append("The library holds no soil, so none is named.")
     if not known.any():
         notes.append(
-            "No stretch of the drive tells of the ground: it stands, spins, is flagged or lacks values throughout."
+            "No stretch of the drive shows the ground: the vehicle stands or spins, or rows are flagged or lack values throughout."
         )
     elif library and (timeline.soil[known] == UNKNOWN).all():
         notes.append("No soil of the library fits any of the drive: all of it is unknown.")
@@ -157,10 +157,10 @@ def _notes(
     if short:
         notes.append(
             f"{short} stretch{'es' * (short > 1)} between changes {'are' if short > 1 else 'is'} too short for vehicle and tool "
-            "to be on together, and no section."
+            "to be on together, and not a section."
         )
     if 0 < known.mean() < 0.5:
         notes.append(
-            f"Only {100 * known.mean():.0f} % of the drive tells of the ground; elsewhere the soil is carried on."
+            f"Only {100 * known.mean():.0f} % of the drive shows the ground; elsewhere the last soil is assumed."
         )
     return tuple(notes)

@@ -64,7 +64,7 @@ def _immobilization(estimates: Estimates, rows: Ints) -> str:
     """From the kernel's own signs and thresholds: columns ``warning``, ``warning_<sign>`` and tg_watch_settings."""
     limits, row = watch_limits(), rows[0]
     slip, speed = _mean(estimates, "slip", rows[:1])[0], abs(estimates["ground_speed"][row])
-    text = f"The wheels begin to dig: slip is {slip:.0%} in the mean of the wheels, at {speed:.2f} m/s"
+    text = f"The wheels begin to dig: mean slip of the wheels is {slip:.0%}, at {speed:.2f} m/s"
     if "warning" not in estimates:
         return text + "."
     known = {sign: f"warning_{sign}" for sign in SIGNS if f"warning_{sign}" in estimates}
@@ -74,7 +74,7 @@ def _immobilization(estimates: Estimates, rows: Ints) -> str:
     most = max(points.values())
     sentence = {
         "rise": f"slip of the worst wheels rose by {change['rise']:.0%} or more",
-        "high_slip": f"it is surely above {limits['high_slip']:.0%}",
+        "high_slip": f"it is certainly above {limits['high_slip']:.0%}",
         "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} or more below its usual",
         "resistance": f"soil resistance rose by {change['resistance']:.2f} or more",
     }
@@ -113,9 +113,9 @@ def _push(estimates: Estimates, rows: Ints) -> str:
     adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
     resistance = float(np.nanmin(estimates["soil_resistance"][rows]))
     return (
-        f"The wheels pull (adhesion {adhesion:.2f} from the drive torques) and yet something pushes from behind, as a tool that "
-        f"runs up does: the drawbar force is negative by more than {limits['push']:.1%} of the weight, or the soil resistance, "
-        f"down to {resistance:.2f}, is less than none."
+        f"The wheels pull (adhesion {adhesion:.2f} from the drive torques) but something pushes from behind, such as a tool that "
+        f"runs up: the drawbar force is negative by more than {limits['push']:.1%} of the weight, or the soil resistance, "
+        f"down to {resistance:.2f}, is negative."
     )
 
 
@@ -130,7 +130,7 @@ def _standstill(estimates: Estimates, rows: Ints) -> str:
 def _gap(estimates: Estimates, rows: Ints) -> str:
     gap = estimates.about.get("settings", {}).get("gap") or watch_limits()["gap"]
     return (
-        f"No wheel speed or ground speed came for more than {gap:g} s, or none had come yet: the motion starts anew, "
+        f"No wheel speed or ground speed came for more than {gap:g} s, or none had come yet: the motion starts again; "
         "what was known of the ground is kept with a wider spread."
     )
 
@@ -140,13 +140,13 @@ def _outlier(estimates: Estimates, rows: Ints) -> str:
     worst = int(np.nanargmax(nis)) if np.isfinite(nis).any() else 0
     return (
         f"A value lay far from what the filter, or the channel's own past, led to expect (at {estimates.time[rows[worst]]:.2f} s "
-        f"the squared innovation is {nis[worst]:.0f}, {channels[worst]:.0f} are usual): it was taken with little weight."
+        f"the squared innovation is {nis[worst]:.0f}, {channels[worst]:.0f} are usual): it was used with little weight."
     )
 
 
 def _restart(estimates: Estimates, rows: Ints) -> str:
     return (
-        f"A step of the filter left the finite numbers (at {estimates.time[rows[0]]:.2f} s): it began anew from the priors; what it had "
+        f"A filter step gave numbers that are not finite (at {estimates.time[rows[0]]:.2f} s): it restarted from the priors; what it had "
         "learned of adhesion and soil resistance is lost."
     )
 

@@ -150,7 +150,7 @@ def read(path: str | os.PathLike[str]) -> tuple[Ground, ...]:
         return tuple(_ground(one, data) for one in data["runs"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
-            f"is damaged ({error})", file=file, hint="write it anew with 'terragrip ground'"
+            f"is damaged ({error})", file=file, hint="write it again with 'terragrip ground'"
         ) from None
 
 

@@ -97,7 +97,7 @@ class MapMaker:
         vehicle = estimates.vehicle
         if not has_positions(estimates):
             raise InputError(
-                "holds no positions", file=file or run, hint="estimate a log with latitude and longitude"
+                "has no positions", file=file or run, hint="estimate a log with latitude and longitude"
             )
         epsg = self._epsg or zone_of(estimates["latitude"], estimates["longitude"])
         cell = self._cell or self.settings.cell or usual_cell(vehicle)
@@ -111,7 +111,7 @@ class MapMaker:
         self.notes += [f"{run}: {note}" for note in places.notes]
         if vehicle.antenna is None:
             self.notes.append(
-                f"{run}: the vehicle file has no antenna; it is taken to stand over the rear axle."
+                f"{run}: the vehicle file has no antenna; it is assumed to be over the rear axle."
             )
         way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
         for reading in readings_of(estimates, places, self.settings.reference_slip, self.library):
@@ -137,7 +137,7 @@ class MapMaker:
             raise InputError(
                 "has no usable stretch of positions",
                 file=file,
-                hint="look at the positions: too few, or all jumps",
+                hint="check the positions: there are too few, or all are jumps",
             )
         if self.runs:
             east, north = np.nanmedian(places.east), np.nanmedian(places.north)
@@ -146,7 +146,7 @@ class MapMaker:
                 raise InputError(
                     f"lies {away / 1000:.0f} km from the first run",
                     file=file,
-                    hint="map it by itself, or look at its positions",
+                    hint="map it separately, or check its positions",
                 )
         long, wide = np.ptp(places.east[known]), np.ptp(places.north[known])
         if (long / cell + 1) * (wide / cell + 1) > MOST_CELLS:
@@ -173,7 +173,7 @@ class MapMaker:
                     )
         if not cells:
             raise InputError(
-                "no row of the runs tells of the ground where its place is known",
+                "no row with a position shows the ground",
                 hint="drive, with positions",
             )
         judged = GROUND if any(name in cells for name in GROUND) else ("slip",)

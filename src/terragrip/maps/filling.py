@@ -37,7 +37,7 @@ def filled(cells: Cells, reach: float) -> Cells:
     low, high = place.min(axis=0) - int(reach), place.max(axis=0) + int(reach)
     if np.prod(high - low + 1.0) > 50 * MOST:
         raise InputError(
-            "the runs lie too far apart to fill between", place="--fill", hint="map them one by one"
+            "the runs are too far apart to fill between", place="--fill", hint="map them one by one"
         )
     tree = cKDTree(place)
     wanted = _near(tree, place, low, high, reach)

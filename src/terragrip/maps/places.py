@@ -78,7 +78,7 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     them (:mod:`terragrip.maps.plausible`).
     """
     if not has_positions(estimates):
-        raise InputError("holds no positions", file=file, hint="estimate a log with latitude and longitude")
+        raise InputError("has no positions", file=file, hint="estimate a log with latitude and longitude")
     latitude, longitude = estimates["latitude"], estimates["longitude"]
     vehicle, way = estimates.vehicle, np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
     fixes = _fixes(latitude, longitude)
@@ -117,13 +117,13 @@ def _projected(latitude: Floats, longitude: Floats, epsg: int, datum: str) -> tu
         system = CRS.from_user_input(datum)
     except ProjError as error:
         raise InputError(
-            f"{datum!r} is no coordinate reference system", place="--datum", hint="write e.g. EPSG:4258"
+            f"{datum!r} is not a coordinate reference system", place="--datum", hint="write e.g. EPSG:4258"
         ) from error
     if not system.is_geographic:
         raise InputError(
-            f"{datum!r} ({system.name}) is none of latitude and longitude",
+            f"{datum!r} ({system.name}) is not in latitude and longitude",
             place="--datum",
-            hint="name the one that the receiver's degrees are of, e.g. EPSG:4258; metres of a grid: make degrees of them first",
+            hint="name that of the receiver's degrees, e.g. EPSG:4258; convert metres of a grid to degrees first",
         )
     transformer = Transformer.from_crs(system, epsg, always_xy=True)
     east, north = transformer.transform(longitude, latitude)
@@ -163,7 +163,7 @@ def _pieces(time: Floats, way: Floats, east: Floats, north: Floats) -> tuple[Int
     notes = []
     if outage.any():
         notes.append(
-            f"{counted(outage, 'outage')} of the positions, {driven[outage].sum():.0f} m of way, left blank."
+            f"{counted(outage, 'outage')} of the positions, {driven[outage].sum():.0f} m of way, left empty."
         )
     if (jump & ~outage).any():
         where = time[1:][jump & ~outage][0]

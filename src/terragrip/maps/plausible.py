@@ -81,7 +81,7 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
             f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
             file=file,
             place=place,
-            hint="look at the units of latitude, longitude and ground_speed in the profile, and at the positions' resolution",
+            hint="check the units of latitude, longitude and ground_speed in the profile, and at the positions' resolution",
         )
     turning = _wheel_turns(estimates, fixes, ends)
     if turning is not None and _mirrored(latitude, longitude, ends, turning):

@@ -18,7 +18,7 @@ from terragrip.maps.values import QUANTITIES
 
 Ints = npt.NDArray[np.int64]
 
-_REMAKE = "make it anew: terragrip map ESTIMATES... -o map.gpkg"
+_REMAKE = "make it again: terragrip map ESTIMATES... -o map.gpkg"
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,9 @@ def _about(file: Path) -> About:
         info = pyogrio.read_info(file, layer="cells")
         return About.from_text((info["dataset_metadata"] or {})[ABOUT])
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError) as error:
-        raise InputError("is no GeoPackage with a layer of cells", file=file, hint=_REMAKE) from error
+        raise InputError("is not a GeoPackage with a layer of cells", file=file, hint=_REMAKE) from error
     except (KeyError, ValueError, TypeError) as error:
-        raise InputError("is no map of this version of Terragrip", file=file, hint=_REMAKE) from error
+        raise InputError("is not a map of this version of Terragrip", file=file, hint=_REMAKE) from error
 
 
 def _names(file: Path) -> dict[str, int]:

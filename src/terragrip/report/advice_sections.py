@@ -218,7 +218,7 @@ def _missing(advice: Mapping[str, Advice], order: Sequence[str]) -> Table | None
     rows = tuple(
         (sentence, "all" if len(soils) == len(order) else names(soils)) for sentence, soils in of.items()
     )
-    return Table("What is not known, and what would tell it.", ("missing", "for"), rows)
+    return Table("What is not known, and what would show it it.", ("missing", "for"), rows)
 
 
 def _between(value: float, interval: tuple[float, float]) -> str:

@@ -122,7 +122,7 @@ def blocks_of(
                 "is missing",
                 file=file,
                 place=f"column {name}",
-                hint="write the estimates anew with terragrip estimate",
+                hint="write the estimates again with 'terragrip estimate'",
             )
     time = np.asarray(columns["time"], dtype=float)
     if not time.size:
@@ -134,7 +134,7 @@ def blocks_of(
             f"{distance[row]} is no distance",
             file=file,
             place=f"column distance, row {row}",
-            hint="write the estimates anew with terragrip estimate",
+            hint="write the estimates again with 'terragrip estimate'",
         )
     first = float(time[0]) if origin is None else origin
     count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
@@ -206,7 +206,7 @@ def estimates_blocks(estimates: Estimates, rows: Bools | None = None, file: str 
     """
     if not estimates.has_adhesion:
         raise InputError(
-            "holds slip but no adhesion: the ground is recognised by adhesion and soil resistance, which need drive torques",
+            "has slip but no adhesion: the ground is recognised by adhesion and soil resistance, which need drive torques",
             file=file,
             hint="estimate a log with torques; slip alone changes with the pull, on one and the same ground",
         )

@@ -85,10 +85,10 @@ def compare_forms(
     else:
         sentence = (
             f"The {asked} form cannot follow these data: {way}, its error is {mine.error:.3g} against {best.error:.3g} "
-            f"of the {best.form} form; take that one."
+            f"of the {best.form} form; use that one."
         )
     if len(compared) < len(names):
-        sentence += f" {levels} slip bins cannot tell forms of more than {levels - 2} parameters."
+        sentence += f" {levels} slip bins cannot distinguish forms of more than {levels - 2} parameters."
     return FormVerdict(asked, tuple(scores), follows, None if follows else best.form, sentence)
 
 

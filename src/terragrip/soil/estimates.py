@@ -84,7 +84,7 @@ class GatheredRuns:
         """Add one run; `soil` names all its rows, errors name `file`; `signatures`: False adds no blocks."""
         if not estimates.has_adhesion:
             problem, hint = (
-                "holds slip but no adhesion, so no soil can be learned",
+                "has slip but no adhesion, so no soil can be learned",
                 "estimate a log with torques",
             )
             raise InputError(problem, file=file or run, hint=hint)

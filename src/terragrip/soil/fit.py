@@ -213,7 +213,8 @@ class AdhesionCurve:
         if isinstance(self.fixed, str):
             if self.fixed != FREE:
                 raise InputError(
-                    f"fixed={self.fixed!r} is no choice", hint="give a mapping of names to numbers, or 'free'"
+                    f"fixed={self.fixed!r} is not a choice",
+                    hint="give a mapping of names to numbers, or 'free'",
                 )
             return {}
         try:

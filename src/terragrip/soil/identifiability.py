@@ -53,7 +53,7 @@ def judge(
     condition = float(values[0] / max(values[-1], values[0] * 1e-16))
     effective = effective_parameters(parameters) if model.name == "exponential" else None
     if condition < LIMIT and r2 < POOR:
-        sentence = f"The curve explains little of the bins (R2 {r2:.2f}), so they do not fix {', '.join(names)}: take it as a hint."
+        sentence = f"The curve explains little of the bins (R2 {r2:.2f}), so they do not fix {', '.join(names)}: use it as a hint only."
         return Identifiability(condition, False, effective, None, None, sentence)
     if condition < LIMIT:
         sentence = f"The data fix {', '.join(names)} (condition number {condition:.3g})."

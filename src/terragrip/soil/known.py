@@ -20,7 +20,7 @@ def known_soils(library: SoilLibrary, names: Iterable[str]) -> Campaign:
     """The library's soils of these names; a name that is not in it is not fitted."""
     wanted = sorted(set(names))
     soils = {name: _known(library[name]) for name in wanted if name in library}
-    return Campaign(soils, {n: "the library does not hold it" for n in wanted if n not in library}, ())
+    return Campaign(soils, {n: "the library does not contain it" for n in wanted if n not in library}, ())
 
 
 def _known(soil: Soil) -> LearnedSoil:

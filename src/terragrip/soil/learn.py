@@ -244,7 +244,7 @@ def _learn(
     if curve.interval_ and len(parts) < FEW_RUNS:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
-            "they do not hold how much runs differ."
+            "they do not cover the differences between runs."
         )
     resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
@@ -334,8 +334,8 @@ def explaining(curve: AdhesionCurve) -> AdhesionCurve:
     """The fitted curve. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
     if curve.r2_ <= 0:
         raise InputError(
-            f"the {curve.model} curve explains nothing of its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
-            "slip may have been too small to tell from its noise",
+            f"the {curve.model} curve does not explain its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
+            "slip may have been too small beside its noise",
             hint="drive at more slip",
         )
     return curve

@@ -122,8 +122,8 @@ class SoilLibrary(Mapping[str, Soil]):
         try:
             text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
         except ValueError as error:
-            hint = "leave out what is not known (None), it is written as null"
-            raise InputError(f"a number of a soil is none ({error})", file=path, hint=hint) from None
+            hint = "leave out unknown numbers (None); they are written as null"
+            raise InputError(f"a number of a soil is not one ({error})", file=path, hint=hint) from None
         with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
             stream.write(text + "\n")
 
@@ -156,7 +156,7 @@ class SoilLibrary(Mapping[str, Soil]):
     def merge(self, other: SoilLibrary, clash: str = "refuse") -> SoilLibrary:
         """The soils of both libraries. `clash`: "refuse" two soils of one name (InputError), "keep" ours, or "replace" by theirs."""
         if clash not in ("refuse", "keep", "replace"):
-            raise InputError(f"clash={clash!r} is no choice", hint="use 'refuse', 'keep' or 'replace'")
+            raise InputError(f"clash={clash!r} is not a choice", hint="use 'refuse', 'keep' or 'replace'")
         twins = sorted(set(self.soils) & set(other.soils))
         if twins and clash == "refuse":
             raise InputError(

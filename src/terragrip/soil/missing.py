@@ -68,7 +68,7 @@ def what_to_drive(
 def in_words(name: str, gaps: Sequence[Gap]) -> list[str]:
     """A sentence for each gap, for the report and the command line."""
     if not gaps:
-        return [f"{name}: every slip bin holds enough samples."]
+        return [f"{name}: every slip bin has enough samples."]
     out = []
     for gap in gaps:
         low, high = gap.slip
@@ -76,7 +76,7 @@ def in_words(name: str, gaps: Sequence[Gap]) -> list[str]:
         speed = f" at about {gap.speed:.1f} m/s wheel speed" if gap.speed else ""
         if gap.pull[1] <= 0:
             out.append(
-                f"{start} It lies below the pull that rolling takes: drive without a tool, or be pushed."
+                f"{start} It is below the pull needed for rolling: drive without a tool, or be pushed."
             )
         elif not gap.reachable:
             out.append(

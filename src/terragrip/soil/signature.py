@@ -68,10 +68,10 @@ class Signature:
             sound = False
         if not sound:
             raise InputError(
-                "is no signature of a soil",
+                "is not a signature of a soil",
                 file=file,
                 place=place,
-                hint="learn the library anew with terragrip soils",
+                hint="learn the library again with 'terragrip soils'",
             )
         return cls(
             arrays["level"],

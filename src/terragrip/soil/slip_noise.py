@@ -53,7 +53,7 @@ def correct_slip_noise(
     columns = np.stack([np.ravel(np.asarray(x, dtype=float)) for x in (slip, adhesion, slip_std)])
     columns = columns[:, np.isfinite(columns).all(axis=0)]
     if not columns.size:
-        raise InputError("no pair has a slip deviation", hint="give estimates written by this terragrip")
+        raise InputError("no pair has a slip deviation", hint="give estimates written by this Terragrip")
     s, mu, sd = columns[:, :: max(columns.shape[1] // SAMPLES, 1)]
 
     def again(noisy: Floats) -> dict[str, float]:

@@ -289,7 +289,7 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
         (GOOD, ["hard"], {}, "not a list"),
         ([], [], {}, "no recording"),
         ([GOOD, 3], ["hard", "wet"], {}, "recordings[1]"),
-        ([GOOD, OTHER[["time"]]], ["hard", "wet"], {}, "recordings[1]: holds no usable channel"),
+        ([GOOD, OTHER[["time"]]], ["hard", "wet"], {}, "recordings[1]: has no usable channel"),
         ([GOOD, OTHER.drop(columns="time")], ["hard", "wet"], {}, "column time"),
         ([GOOD, OTHER.iloc[::-1]], ["hard", "wet"], {}, "runs back"),
         ([GOOD, OTHER.iloc[:0]], ["hard", "wet"], {}, "empty"),
@@ -310,7 +310,7 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
         ),
         ([GOOD.head(60)] * 24, ["hard", "wet"] * 12, {}, "longer than a window"),
         ([STILL, STILL], ["hard", "wet"], {}, "nothing measured differs"),
-        ([GOOD, OTHER.assign(acceleration_x=1.7e308)], ["hard", "wet"], {}, "1.7e+308 is no measurement"),
+        ([GOOD, OTHER.assign(acceleration_x=1.7e308)], ["hard", "wet"], {}, "1.7e+308 is not a measurement"),
     ],
 )
 def test_what_cannot_be_learnt_from_is_refused_in_one_line(

@@ -126,7 +126,7 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
         ({"version": 2}, "version 2"),
         ({"version": 4}, "version 4"),
         ({"version": "x"}, "version 'x'"),
-        ({"format": "a cake"}, "no ground classifier"),
+        ({"format": "a cake"}, "not a ground classifier"),
         ({"classes": ["hard"]}, "damaged"),
         ({"classes": ["a", "b"]}, "damaged"),
         ({"experts": []}, "damaged"),
@@ -167,7 +167,7 @@ def test_foreign_files_are_refused(tmp_path: Path) -> None:
         b"\x80\x04.",
     ):
         path.write_bytes(content)
-        with pytest.raises(InputError, match=r"no ground classifier|damaged") as refused:
+        with pytest.raises(InputError, match=r"not a ground classifier|damaged") as refused:
             GroundClassifier.load(path)
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="no such file"):

@@ -123,9 +123,7 @@ def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
         result = [message_of(database, message) for message in database.messages]
     except errors as error:
         sentence = " ".join(str(error).split())[:120]
-        raise InputError(
-            f"is no DBC that can be read ({sentence})", file=file, hint="export it again"
-        ) from error
+        raise InputError(f"is not a readable DBC ({sentence})", file=file, hint="export it again") from error
     if not result:
         raise InputError("describes no message", file=file, hint="give the DBC of the machine's bus")
     return result

@@ -71,7 +71,7 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: Payloads) -> d
 
 def _on_senders(best: dict[str, tuple[int, int]], several: set[str]) -> list[str]:
     return [
-        f"{name} has several senders; it is that of address {-best[name][1]:02X} hex, which has most valid samples."
+        f"{name} has several senders; it is taken from address {-best[name][1]:02X} hex, which has the most valid samples."
         for name in sorted(several)
     ]
 
@@ -99,5 +99,7 @@ def _on_frames(frames: Frames) -> list[str]:
         what = "identifier" if count == 1 else "identifiers"
         notes.append(f"{total} of {frames.count} frames are in no DBC or table, those of the {what} {shown}.")
     if frames.transport.broken:
-        notes.append(f"{frames.transport.broken} messages of several frames lack a part and were left out.")
+        notes.append(
+            f"{frames.transport.broken} messages of several frames are incomplete and were left out."
+        )
     return notes

@@ -89,7 +89,7 @@ def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
         layout = layout_of(next(lines, ""))
         if layout is None:
-            raise InputError("is no table of CAN frames", file=path, hint="give time, id and data columns")
+            raise InputError("is not a table of CAN frames", file=path, hint="give time, id and data columns")
         return table(lines, layout, count, frames)
 
     return _from_lines(path, "table of CAN frames", wanted, databases, parse)
@@ -109,7 +109,7 @@ def finished(
     ``scale`` takes the stamps to seconds; ``refuse_unknown`` False lets a log pass that has other signals.
     """
     if not frames.count:
-        raise InputError("holds no CAN frame", file=path, hint="check that the bus was recorded")
+        raise InputError("has no CAN frame", file=path, hint="check that the bus was recorded")
     if not frames.seen and refuse_unknown:
         count = len(frames.unknown)
         shown = ", ".join(map(identifier_text, sorted(frames.unknown)[:6])) + (", ..." if count > 6 else "")
@@ -160,7 +160,7 @@ def _from_lines(
             last = time
     if count.bad > _MOST_BAD * (count.bad + frames.count):
         problem, hint = (
-            f"is a damaged {kind}, or none: {count.bad} lines hold no frame",
+            f"is a damaged {kind}, or none: {count.bad} lines have no frame",
             "copy or record it again",
         )
         if count.unstamped:
@@ -169,9 +169,7 @@ def _from_lines(
         raise InputError(problem, file=path, place=place, hint=hint)
     notes = []
     if count.bad:
-        what = (
-            "1 line holds no frame:" if count.bad == 1 else f"{count.bad} lines hold no frame, the first is"
-        )
+        what = "1 line has no frame:" if count.bad == 1 else f"{count.bad} lines have no frame, the first is"
         notes.append(f"{what} line {count.first} ({count.shown!r}); left out.")
     scale = 1.0
     span = last - (frames.first or 0.0)
@@ -184,7 +182,7 @@ def _from_lines(
     ):
         scale = 1e-3
         notes.append(
-            "The frames' stamps were taken for milliseconds: as seconds the bus would be next to silent."
+            "The frames' stamps were read as milliseconds: in seconds the bus would be nearly silent."
         )
     return finished(frames, path, notes, databases, scale)
 

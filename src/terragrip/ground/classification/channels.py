@@ -170,5 +170,5 @@ def _refuse_absurd(column: str, values: Floats, time: Floats, name: str) -> None
     rows = np.flatnonzero(np.abs(values) > _LARGEST)
     if len(rows):
         where = place(column, int(rows[0]), time)
-        problem = f"{values[rows[0]]:.3g} is no measurement"
+        problem = f"{values[rows[0]]:.3g} is not a measurement"
         raise InputError(problem, file=name, place=where, hint="leave the cell empty instead")

@@ -107,7 +107,7 @@ class GroundClassifier:
         for recorded, (_, _, name) in zip(signals, tables, strict=True):
             if not recorded.families:
                 hint = "give wheel_speed_*, drive_torque_*, acceleration_* or angular_velocity_* columns, or leave it out"
-                raise InputError("holds no usable channel", file=name, hint=hint)
+                raise InputError("has no usable channel", file=name, hint=hint)
         notes += rates_apart(signals, codes)
         layout, slow = layout_of(signals, self.window)
         if not layout.period:

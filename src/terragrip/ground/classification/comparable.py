@@ -66,7 +66,7 @@ def rates_apart(recorded: Sequence[Signals], codes: npt.NDArray[np.intp]) -> lis
         usual = [float(np.median(periods)) for periods in by_ground.values()]
         if usual and max(usual) > SAME_RATE * min(usual):
             rates = f"every {min(usual):.2g} s on one ground, every {max(usual):.2g} s on another"
-            notes.append(f"{family}: sampled {rates}; what is learnt of it may be the rate.")
+            notes.append(f"{family}: sampled {rates}; what is learned from it may be the rate.")
     return notes
 
 

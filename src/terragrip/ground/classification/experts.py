@@ -50,7 +50,7 @@ def train_experts(
     if within or not training.by_recording:
         one = "one recording that is long enough" if within else "one recording"
         notes.append(
-            f"A ground has but {one}: probabilities are learnt within runs and too sure on new ones."
+            f"A ground has only {one}: probabilities are learned within runs, and too high on new ones."
         )
     unused = frozenset(measured).difference(*(expert.families for expert in result))
     if unused:

@@ -32,10 +32,12 @@ def classes_of(labels: Any, count: int) -> tuple[npt.NDArray[Any], npt.NDArray[n
     listed = one_each(labels, count)
     for k, label in enumerate(listed):
         if not isinstance(label, str | int | float) or label != label or label == "":
-            raise InputError(f"{label!r} is no label", place=f"labels[{k}]", hint="give a text or a number")
+            raise InputError(
+                f"{label!r} is not a label", place=f"labels[{k}]", hint="give a text or a number"
+            )
         if label == UNKNOWN:
             hint = "leave the recording out: what fits no ground is called unknown"
-            raise InputError("'unknown' is no ground to learn", place=f"labels[{k}]", hint=hint)
+            raise InputError("'unknown' cannot be learned as a ground", place=f"labels[{k}]", hint=hint)
     if len({isinstance(label, str) for label in listed}) > 1:
         raise InputError("texts and numbers are mixed", place="labels", hint="give labels of one kind")
     classes, codes = np.unique(np.array(listed), return_inverse=True)

@@ -107,9 +107,9 @@ def load(path: str | os.PathLike[str], make: Callable[[Mapping[str, Any], Learnt
                 raise _foreign(path)
             version = header.get("version")
             if version != VERSION:
-                hint = "update terragrip, or train it anew"
+                hint = "update terragrip, or train it again"
                 raise InputError(
-                    f"is of version {version!r}, this terragrip reads {VERSION}", file=path, hint=hint
+                    f"is of version {version!r}, this Terragrip reads {VERSION}", file=path, hint=hint
                 )
             learnt = _learnt(header, archive)
             try:
@@ -258,9 +258,9 @@ def _plain(value: Any) -> Any:
 
 def _foreign(path: str | os.PathLike[str]) -> InputError:
     return InputError(
-        "is no ground classifier", file=path, hint="name a file that GroundClassifier.save wrote"
+        "is not a ground classifier", file=path, hint="name a file that GroundClassifier.save wrote"
     )
 
 
 def _damaged(path: str | os.PathLike[str], error: Exception) -> InputError:
-    return InputError(f"is damaged ({error})", file=path, hint="copy it again, or train it anew")
+    return InputError(f"is damaged ({error})", file=path, hint="copy it again, or train it again")

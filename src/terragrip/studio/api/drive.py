@@ -122,7 +122,7 @@ def track(
     says how many rows have one."""
     table = table_of(studio, path, version)
     if "latitude" not in table.columns or "longitude" not in table.columns:
-        raise InputError("holds no positions", file=path, hint="estimate a log with latitude and longitude")
+        raise InputError("has no positions", file=path, hint="estimate a log with latitude and longitude")
     for name in column:
         if name not in table.columns:
             raise InputError("is not in the estimates", place=f"column {name}")
