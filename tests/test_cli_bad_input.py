@@ -98,7 +98,7 @@ def refused(place: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
         (table().drop(columns="time"), ["column time"]),
         (table().assign(ground_speed="fast"), ["ground_speed", "row 1", "'fast'"]),
         (with_cell("drive_torque_rl", "n/k"), ["drive_torque_rl", "row 101", "'n/k'"]),
-        (table().assign(time=table()["time"].to_numpy()[::-1]), ["time runs back", "row 2"]),
+        (table().assign(time=table()["time"].to_numpy()[::-1]), ["time goes back", "row 2"]),
         (with_cell("time", 0.99), ["time repeats", "row 101"]),
         (with_cell("time", np.nan), ["column time", "row 101"]),
         (table().assign(ground_speed=np.nan), ["ground_speed", "no value"]),

@@ -152,7 +152,7 @@ def _read_text(file: str) -> str:
 
 
 def _collect_lines(node: Any, place: Place, lines: dict[Place, int], file: str) -> None:
-    """Note the line of every key under ``node``; raises InputError on a key that stands twice."""
+    """Note the line of every key under ``node``; raises InputError on a key that occurs twice."""
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             here = (*place, str(key.value))

@@ -28,7 +28,7 @@ def csv_on_disk(path: str) -> TableOnDisk:
 
     Columns that are asked for are numbers where every cell is one; a column of the recording's schema must hold numbers. Raises
     InputError with row and content, some of it where a block is reached: no such file, empty, not a text table, no header, a row of
-    another width, text in a number column, a name that stands twice.
+    another width, text in a number column, a name that occurs twice.
     """
     refuse_missing(path, suffixes=SUFFIXES)
     with closing(opened(path)) as stream:

@@ -26,7 +26,7 @@ _MISSING = [
 
 
 def chosen_of(dialect: Dialect, chosen: set[str], source: str) -> list[int]:
-    """The places of the columns ``chosen`` by name; raises InputError where one stands twice."""
+    """The places of the columns ``chosen`` by name; raises InputError where one occurs twice."""
     names = dialect.names
     places = [k for k, name in enumerate(names) if name in chosen]
     twice = next((names[k] for k in places if names.count(names[k]) > 1), None)

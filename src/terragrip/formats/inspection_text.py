@@ -99,7 +99,7 @@ def _time_text(time: TimeSummary) -> str:
     if time.gap_count:
         longest = ", ".join(f"{_number(length)} s at {_number(start)} s" for start, length in time.gaps)
         lines.append(f"  gaps: {time.gap_count}, the longest {longest}")
-    faults = ((time.repeated, "repeat"), (time.backward, "run back"), (time.missing, "are missing"))
+    faults = ((time.repeated, "repeat"), (time.backward, "go back"), (time.missing, "are missing"))
     lines += [f"  {count} stamps {what}" for count, what in faults if count]
     return "\n".join(lines)
 

@@ -291,7 +291,7 @@ STILL = GOOD[["time"]].assign(**dict.fromkeys(BODY, 1.0))
         ([GOOD, 3], ["hard", "wet"], {}, "recordings[1]"),
         ([GOOD, OTHER[["time"]]], ["hard", "wet"], {}, "recordings[1]: has no usable channel"),
         ([GOOD, OTHER.drop(columns="time")], ["hard", "wet"], {}, "column time"),
-        ([GOOD, OTHER.iloc[::-1]], ["hard", "wet"], {}, "runs back"),
+        ([GOOD, OTHER.iloc[::-1]], ["hard", "wet"], {}, "goes back"),
         ([GOOD, OTHER.iloc[:0]], ["hard", "wet"], {}, "empty"),
         ([GOOD, OTHER.assign(acceleration_x="much")], ["hard", "wet"], {}, "acceleration_x"),
         ([GOOD, OTHER.assign(acceleration_x=np.inf)], ["hard", "wet"], {}, "infinite"),
