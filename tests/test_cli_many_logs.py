@@ -89,6 +89,18 @@ def test_a_folder_with_one_log_goes_into_a_folder_too(place: Path) -> None:
     assert tg.Estimates.read(place / "one.parquet").wheels == ("l", "r")
 
 
+def test_logs_below_a_folder_are_not_left_out_without_a_word(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "ours" / "day2").mkdir()
+    (place / "ours" / "a2.csv").rename(place / "ours" / "day2" / "a2.csv")
+    assert estimate(place, place / "ours") == 0
+    assert slips(place / "out") == {"a0": 0.1, "a1": 0.2}
+    assert f"ours: its subfolders are not searched; '{place}/ours/**/*.csv' names" in capsys.readouterr().err
+    assert estimate(place, place) == 2
+    assert "holds no log, its subfolders do; name them" in capsys.readouterr().err
+
+
 def test_a_profile_each(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     profiles = ["--profile", place / "long.yaml", "--profile", place / "short.yaml"]
     assert estimate(place, place / "ours", place / "theirs/b[01].csv", *profiles) == 0

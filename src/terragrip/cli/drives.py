@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import typer
+
 from terragrip.errors import InputError
 
 _COLUMNS = ("log", "profile", "drive")
@@ -53,20 +55,29 @@ def logs_in(paths: Sequence[Path]) -> list[Path]:
 
 
 def _logs_of(folder: Path) -> list[Path]:
+    entries = sorted(folder.iterdir())
+    inside = [entry for entry in entries if _is_log(entry)]
+    others = [entry for entry in entries if entry.is_dir() and entry not in inside and entry.name[0] != "."]
+    below = next((log for other in others for log in other.iterdir() if _is_log(log)), None)
+    if below is None and not inside:
+        from terragrip.formats.registry import suffixes
+
+        hint = f"name a folder with files such as *{suffixes()[0]}, or a log"
+        raise InputError("holds no log", file=folder, hint=hint)
+    if below is not None:
+        pattern = f"'{folder}/**/*{below.suffix}'"
+        if not inside:
+            raise InputError("holds no log, its subfolders do", file=folder, hint=f"name them, or {pattern}")
+        typer.echo(f"{folder}: its subfolders are not searched; {pattern} names what is in them.", err=True)
+    return inside
+
+
+def _is_log(entry: Path) -> bool:
     from terragrip.formats.registry import is_bag, suffixes
 
-    known = suffixes()
-    inside = sorted(
-        entry
-        for entry in folder.iterdir()
-        if not entry.name.startswith(".")
-        and ((entry.is_file() and entry.name.lower().endswith(known)) or (entry.is_dir() and is_bag(entry)))
-    )
-    if not inside:
-        raise InputError(
-            "holds no log", file=folder, hint=f"name a folder with files such as *{known[0]}, or a log"
-        )
-    return inside
+    if entry.name.startswith("."):
+        return False
+    return entry.name.lower().endswith(suffixes()) if entry.is_file() else entry.is_dir() and is_bag(entry)
 
 
 def drives_of(arguments: Sequence[Path], profiles: Sequence[Path], joined: Sequence[Path]) -> list[Drive]:
