@@ -53,6 +53,8 @@ class Part(BaseModel):
         for key in data:
             if key not in known:
                 hint = suggestion(str(key), known, f"known keys are {', '.join(known)}")
+                if str(key)[:1].isdigit() and data[key] is None:  # YAML's comma has ended the value before it
+                    hint = f"part of a number with a decimal comma? write a decimal point ('0.{key}')"
                 raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "hint": hint})
         return data
 

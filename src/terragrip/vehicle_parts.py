@@ -26,10 +26,11 @@ def _read(unit: str, low: float, high: float, likely: tuple[str, ...], above: bo
         suffix = "" if unit == "1" else f" {unit}"
         bound = "exceed" if above else "be at least"
         hint = f"it must {bound} {low:g}{suffix} and not exceed {high:g}{suffix}"
-        for other in likely if isinstance(value, int | float) else ():
-            if low < number * factor_to(other, unit) <= high:
-                hint = f"{number:g} {other}? write '{number:g} {other}'"
-                break
+        units = likely if isinstance(value, int | float) else ()
+        meant = [f"{number:g} {one}" for one in units if low < number * factor_to(one, unit) <= high]
+        if meant:
+            quoted = " or ".join(f"'{text}'" for text in meant)
+            hint = f"{' or '.join(meant)}? write {quoted}"
         raise UnitError(f"{number:g}{suffix} is impossible", hint)
 
     return check
