@@ -52,3 +52,17 @@ def test_without_torques_nothing_says_that_the_wheels_pull() -> None:
     speeds = {n: v for n, v in result.recording.channels.items() if "torque" not in n}
     bare = replace(result, recording=replace(result.recording, channels=speeds))
     assert not any(note.startswith("While the wheels pull") for note in told(bare, 0.92))
+
+
+@pytest.mark.parametrize(("ratio", "said"), [(1.0, False), (8.0, False), (25.0, True)])
+def test_torques_with_which_nothing_rolls_are_named(
+    columns: dict[str, np.ndarray], vehicle: Vehicle, ratio: float, said: bool
+) -> None:
+    """Of a motor behind a gear, at a steady speed without a drawbar force: nothing else told."""
+    small = {
+        n: v / ratio if n.startswith("drive_torque") else v
+        for n, v in columns.items()
+        if n != "drawbar_force"
+    }
+    notes = unit_warnings(Recording.from_frame(small), vehicle)
+    assert any("with which no vehicle starts or rolls on ground" in note for note in notes) is said

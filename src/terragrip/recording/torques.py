@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 _MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground carries
+_LEAST = 0.02  # of the weight: a thrust that is hardly ever exceeded; tires on a road take .01, and starts more (right logs: .07 at least)
 _BRAKING = 0.06  # of the weight: a mean that brakes a drive down a 10 % grade throughout
 _WITHIN = 2.0  # s, the largest lag searched
 _MOVING = 0.3  # of the rims' speed that a twentieth of the drive exceeds
@@ -66,6 +67,12 @@ def _scale_warnings(
         return [
             f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, while the vehicle drives "
             "forward: write 'sign: -1' for each in the profile."
+        ]
+    most = quantile(np.abs(thrust[np.isfinite(thrust)]), 0.95) / STANDARD_GRAVITY if mean else 1.0
+    if most < _LEAST:
+        return [
+            f"The drive torques over the wheel radius stay below {most:.2g} times the weight, with which no vehicle starts or rolls on "
+            f"ground: check the torques' unit and scale {check}."
         ]
     if not towing:
         return []
