@@ -100,6 +100,9 @@ def test_a_receivers_velocities_in_the_plane_go_together() -> None:
         ("Sollgeschwindigkeit [km/h]", None),
         ("Zapfwellendrehzahl [U/min]", None),
         ("Speed (GPS)", "ground_speed"),
+        ("drive torque FL [Nm]", "drive_torque_fl"),
+        ("/drive_torque_fl.data", "drive_torque_fl"),
+        ("drive shaft torque FL", None),
         ("/gps_0/fix/latitude", "latitude"),
     ],
 )

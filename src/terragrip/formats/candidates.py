@@ -125,7 +125,8 @@ def candidates_of(column: Column) -> list[Candidate]:
     standard = _on_the_bus().get(last)
     if standard is not None:
         return [Candidate(standard, own, 0.95, ON_THE_BUS)]
-    if column.name.has("command", "statistic", "change", "other"):
+    ours = column.name.words[:2] == ("drive", "torque")  # "drive" alone may be short for a driveshaft
+    if column.name.has("command", "statistic", "change") or (column.name.has("other") and not ours):
         return []
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
         result = ways(column)
