@@ -47,6 +47,9 @@ class Candidate:
     why: str
 
 
+_WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "icp"})
+"""Odometry by these does not look at the wheels; the profile ros2-4wd takes it for ground speed, too."""
+_FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
 Hint = tuple[str, float, str]
 """What a name says of a column that may be a channel: the channel, the score, and why."""
 
@@ -75,6 +78,8 @@ def columns_of(
                 name = replace(name, concepts=name.concepts | other.concepts, wheel=other.wheel)
         if {"twist", "pose"} & set(name.words) and _root(column) in odometry:
             name = replace(name, concepts=name.concepts | {"odometry"})
+        if _WITHOUT_WHEELS & set(name.words) and not _FUSED & set(name.words):
+            name = replace(name, concepts=name.concepts - {"odometry"})
         if (
             name.wheel.isdigit()
             and column not in alike
@@ -214,8 +219,13 @@ def _of_place(column: Column) -> list[Hint]:
         name.strange or name.wheel or name.has("wheel", "front", "rear", "motor", "coupling")
     ):
         return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
-    if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in name.words)):
+    words = set(name.words)
+    if name.has("current"):
+        return []
+    if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in words)):
         return [("drawbar_force", 0.85, "a pull")]
+    if ("f" in words or column.kind == "force") and (name.has("coupling") or words & {"tow", "draw"}):
+        return [("drawbar_force", 0.65, "a force at the hitch, by its letter or unit")]
     return []
 
 
@@ -233,7 +243,7 @@ def _of_speed(column: Column) -> list[Hint]:
     if name.has("pitch", "roll", "acceleration", "position", "motor"):
         return []
     if name.has("odometry"):
-        if not {"filtered", "filter", "fused", "ekf", "ukf"}.isdisjoint(name.words):
+        if not _FUSED.isdisjoint(name.words):
             return []  # of more than the wheels
         return [("wheel_based_speed", 0.8, "odometry, which is computed from the wheels")]
     if name.has("ground"):

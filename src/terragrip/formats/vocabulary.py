@@ -31,7 +31,7 @@ MEANINGS: dict[str, str] = {
     "longitude": "longitude laengengrad",
     "altitude": "altitude alt height elevation hoehe",
     "position": "position pose pos easting northing utm",
-    "pull": "drawbar draft pull traction zugkraft tiro trekkracht",
+    "pull": "drawbar draft pull traction zugkraft tiro trekkracht fdraw fzug ftow fpull",
     "coupling": "hitch towing trailer",
     "force": "force kraft fuerza forza",
     "mass": "mass weight masse gewicht poids peso massa",
