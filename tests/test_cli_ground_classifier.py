@@ -158,7 +158,7 @@ def test_a_log_without_a_learnt_sensor_or_too_short_and_a_foreign_classifier_are
     pd.DataFrame({"time": time, "acceleration_x": np.sin(time)}).to_csv(tmp_path / "body.csv", index=False)
     tell = ["ground-classifier", "predict", str(tmp_path / "body.csv"), "-o", str(tmp_path / "w.csv")]
     assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
-    assert "body.csv: holds none of the sensors learnt" in capsys.readouterr().err
+    assert "body.csv: has none of the learned sensors" in capsys.readouterr().err
     pd.read_csv(folder / "hard1.csv").head(5).to_csv(tmp_path / "body.csv", index=False)
     assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
     assert "too short for a window" in capsys.readouterr().err

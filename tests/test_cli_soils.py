@@ -281,7 +281,7 @@ def test_libraries_are_joined_twins_refused_and_others_compared(
     )  # a is 0.1 larger, g is 0.43 in the mean
     assert "intervals of a" in line
     learn(tmp_path / "x.json", fine, "--compare", hard)
-    assert "No soil of these" in capsys.readouterr().out
+    assert "None of these soils" in capsys.readouterr().out
 
 
 def test_a_soil_is_named_for_points_and_a_name_that_names_nothing_is_refused(
@@ -292,7 +292,7 @@ def test_a_soil_is_named_for_points_and_a_name_that_names_nothing_is_refused(
     points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in rows))
     result = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]
     assert list(result) == ["clay"]
-    assert "libraries only" in fails(tmp_path / "soils.json", "--soil", "clay")
+    assert "only libraries" in fails(tmp_path / "soils.json", "--soil", "clay")
     points.write_text("clay,,stubble,\nX,Y,X,Y\n" + "\n".join(f"{s},{m},{s},{m}" for s, m in rows))
     assert "holds 2 curves" in fails(points, "--soil", "clay")
 

@@ -214,4 +214,4 @@ def test_light_rows_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFi
         assert main([*words, "--light", wrong]) == 2
         assert "--light: " in capsys.readouterr().err
     assert main([*words, "--light", "1:2", "--light", "3:4"]) == 2
-    assert "give at most one a log" in capsys.readouterr().err
+    assert "give at most one per log" in capsys.readouterr().err

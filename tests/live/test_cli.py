@@ -85,7 +85,7 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
         (["--source", "nothing"], "names no source"),
         (["--source", "udp://127.0.0.1:9", "--sink", "udp://127.0.0.1"], "names no host and port"),
         (["--source", "udp://127.0.0.1:9", "--quiet"], "would go nowhere"),
-        (["--source", "udp://127.0.0.1:9", "--held", "speed=1"], "is no channel and period"),
+        (["--source", "udp://127.0.0.1:9", "--held", "speed=1"], "is not a channel and a period"),
         (["--source", "udp://127.0.0.1:9", "--method", "aukf-sf"], "did you mean"),
         (["--source", "udp://127.0.0.1:9", "--library", "no.json"], "no such file"),
         (

@@ -142,7 +142,7 @@ def test_rate_thins_set_points_with_their_estimates():
     [
         (["--setpoint", "0.11"], "--speed"),
         (["--speed", "1.5"], "--setpoint"),
-        (["--setpoint", "fast", "--speed", "1"], "no slip"),
+        (["--setpoint", "fast", "--speed", "1"], "neither a slip"),
         (["--setpoint", "0.9", "--speed", "1"], "not a set-point"),
         (["--setpoint", "nothing.json", "--speed", "1"], "cannot be read"),
         (["--setpoint", "11%", "--speed", "-1"], "not forward"),

@@ -117,7 +117,7 @@ def test_a_certificate_that_cannot_be_used_is_refused_in_one_line(
 ) -> None:
     chain, key = map(str, certificate)
     for words, said in (
-        ([chain], "--tls-key: a certificate and its key are needed both"),
+        ([chain], "--tls-key: a certificate needs its key, and a key its certificate"),
         ([chain, "--tls-key", str(tmp_path / "none.key")], "none.key: --tls-certificate: is not there"),
         ([key, "--tls-key", key], "cannot be used with"),
     ):

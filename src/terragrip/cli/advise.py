@@ -28,10 +28,11 @@ def command(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Say which slip is best, and what to do for it.
+    """Advise on the best slip, load, speed and ballast.
 
-    By soil: the slip of best efficiency and of most pull power with intervals, the front between them, grip in reserve, what to do about
-    load, speed, ballast and tyre pressure, and what is missing. Without torques: slip against the usual band of 8 to 15 %.
+    For each soil: the slip of best efficiency and of most pull power with intervals, the trade-off between them, grip in reserve, what to
+    do about load, speed, ballast and tyre pressure, and which data are missing. Without torques: slip compared with the usual band of 8
+    to 15 %.
     """
     from terragrip.advice.analysis import advise
     from terragrip.advice.result import words, write

@@ -28,7 +28,7 @@ def command(
         typer.Option(
             "--light",
             metavar="FROM:TO",
-            help="Seconds of a log without torque that were driven without load, or 'all'; once a log, in their order.",
+            help="Seconds of a log without torque that were driven without load, or 'all'; once per log, in their order.",
         ),
     ] = None,
     quiet: Quiet = False,
@@ -74,7 +74,7 @@ def _spans(light: list[str], logs: int) -> list[tuple[float, float] | None] | No
         return None
     if len(light) > logs:
         raise InputError(
-            f"{len(light)} spans for {logs} logs", place="--light", hint="give at most one a log"
+            f"{len(light)} spans for {logs} logs", place="--light", hint="give at most one per log"
         )
     spans: list[tuple[float, float] | None] = []
     for text in light:
@@ -85,7 +85,7 @@ def _spans(light: list[str], logs: int) -> list[tuple[float, float] | None] | No
             span = (math.nan, math.nan)
         if not span[0] < span[1]:
             raise InputError(
-                f"{text!r} is no span", place="--light", hint="write e.g. '120:300' [s], or 'all'"
+                f"{text!r} is not a span", place="--light", hint="write e.g. '120:300' [s], or 'all'"
             )
         spans.append(span)
     return spans + [None] * (logs - len(light))

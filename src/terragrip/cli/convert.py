@@ -24,8 +24,8 @@ def command(
 ) -> None:
     """Write estimates as a file of another program.
 
-    Excel, MATLAB, QGIS, Foxglove: the suffix says which. All columns with their units and what the estimates were made from; what a file
-    cannot hold is refused before the work.
+    For Excel, MATLAB, QGIS or Foxglove, by the suffix. The file has all columns with their units, and the origin of the estimates.
+    Estimates that the format cannot represent are refused before any work.
     """
     from terragrip.estimation.converting import convert
 

@@ -22,7 +22,7 @@ def command(
 ) -> None:
     """Simulate, estimate and score a campaign.
 
-    The paper's field campaign on five soils, every method, beside the paper's scores: figures and a page.
+    The paper's field campaign on five soils with every method, beside the paper's scores, as figures and a page.
     """
     from terragrip.report.demo import SEED, run_demo
 

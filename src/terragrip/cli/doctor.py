@@ -10,8 +10,8 @@ _MARK = {"ok": "ok", "note": "-", "fix": "FIX", "defect": "DEFECT"}
 def command() -> None:
     """Check this installation.
 
-    Versions, extras, the kernel against a known answer, the studio's pages and port, browser, permissions. Exit code 0: it works
-    (what is optional may be absent); 2: something has to be set right here; 1: the kernel computes wrongly.
+    Checks versions, extras, the kernel against a known answer, the studio's pages and port, browser and permissions. Exit code 0: it works
+    (optional parts may be absent); 2: a line marked FIX needs your action; 1: the kernel computes wrongly.
     """
     from terragrip.doctor import findings
 

@@ -92,7 +92,7 @@ def drives_of(arguments: Sequence[Path], profiles: Sequence[Path], joined: Seque
             raise InputError(
                 "there are several logs",
                 place="--with",
-                hint="join one drive at a time, or say which by --drives TABLE",
+                hint="join one drive at a time, or name them in --drives TABLE",
             )
         sources = (*logs, *joined)
         return [Drive(logs[0].name, sources, _each(profiles, len(sources), "source of the drive"))]

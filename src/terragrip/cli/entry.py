@@ -70,7 +70,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback(invoke_without_command=True)
 def _terragrip(
     context: typer.Context,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Log what is done to standard error.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Log each step to standard error.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of a failure.")] = False,
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")

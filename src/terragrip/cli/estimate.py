@@ -46,14 +46,14 @@ def command(
         ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
-    smooth: Annotated[bool, typer.Option("--smooth", help="Run the whole log backwards too.")] = False,
+    smooth: Annotated[bool, typer.Option("--smooth", help="Also smooth the whole log backwards.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Estimate traction from logs.
 
-    Adhesion, slip, soil resistance, net traction and efficiency of every wheel at every row, each with its
-    standard deviation, as Parquet. Where no torque was logged: slip, from speeds alone. A log of several that cannot be read
-    does not stop the others; the exit code is 2 then.
+    Adhesion, slip, soil resistance, net traction and efficiency of every wheel in every row, each with its standard deviation, as Parquet.
+    Without a logged torque: slip, from speeds alone. Of several logs, one that cannot be read does not stop the others; the exit code
+    is then 2.
     """
     from terragrip.estimation.methods import method_named
     from terragrip.formats.registry import is_bag

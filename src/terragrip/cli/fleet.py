@@ -87,7 +87,7 @@ def command(
 ) -> None:
     """Estimate any number of logs into one data set.
 
-    A second call estimates only what is new or changed. Every log ends up in the data set or, with the reason, in failures.parquet.
+    A second call estimates only what is new or changed. Every log is then in the data set or, with the reason, in failures.parquet.
     """
     import time
 

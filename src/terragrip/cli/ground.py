@@ -37,22 +37,21 @@ def command(
         bool,
         typer.Option("--online", help="As it would have been reported while driving, without looking ahead."),
     ] = False,
-    length: Annotated[
-        float, typer.Option(metavar="M", help="Mean way on one ground before the data speak.")
-    ] = 30.0,
+    length: Annotated[float, typer.Option(metavar="M", help="Prior mean distance on one ground.")] = 30.0,
     signal: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Look for changes in this signal (may be repeated; a wrong name lists them). Default: those of the ground alone.",
+            help="Look for changes in this signal (may be repeated; a wrong name lists all). Default: those of the ground alone.",
         ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Find changes of the ground, name the soils, list events.
 
-    Changes with time, spread and probability; sections in which vehicle and tool are on one soil, with slip and adhesion; which soil of the
-    library it is, with probabilities, or 'unknown' where none fits; events. All drives go into one file, each entry with its run.
+    Changes with time, standard deviation and probability; sections in which vehicle and tool are on one soil, with slip and adhesion; the
+    soil of the library with probabilities, or 'unknown' where none fits; events. All drives are written to one file, each entry with
+    its run.
     """
     from terragrip.estimation import Estimates
     from terragrip.ground.analysis import Settings, analyse
@@ -61,7 +60,7 @@ def command(
     from terragrip.soil.signature import signature_in
 
     if not 0 < length < float("inf"):
-        raise InputError(f"{length:g} is no length", place="--length", hint="give metres, e.g. 30")
+        raise InputError(f"{length:g} is not a length", place="--length", hint="give metres, e.g. 30")
     runs = _names(estimates)
     inputs = [*estimates, *([library] if library else [])]
     target = check_file(output, inputs, suffixes=(".json",))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from terragrip.ground.classification.classifier import GroundClassifier
 
 app = typer.Typer(
-    help="Tell grounds apart from wheels and body sensor alone: train, then predict.", rich_markup_mode=None
+    help="Recognise grounds from wheels and body sensors alone: train, then predict.", rich_markup_mode=None
 )
 
 
@@ -38,8 +38,8 @@ def train(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="A table (CSV) file,label[,with], a row for each drive; 'with' names another log of it. "
-            "Without one, the logs' own column says what they drive on.",
+            help="A CSV table with the columns file,label[,with], one row per drive; 'with' names another log of it. "
+            "Without it, the logs' own column names the ground.",
         ),
     ] = None,
     column: Annotated[
@@ -48,12 +48,13 @@ def train(
     profile: ProfileFile = None,
     dbc: DbcFiles = None,
     window: Annotated[float, typer.Option(metavar="S", help="Length of a window.")] = 1.7,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the draws in training.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Random seed of the training.")] = 0,
     quiet: Quiet = False,
 ) -> None:
     """Learn grounds from labelled drives.
 
-    Wheel speeds, torques or motor currents, accelerations, angular velocities: whatever there is. Give several drives of each ground.
+    Uses wheel speeds, torques or motor currents, accelerations and angular velocities, as far as logged. Give several drives of each
+    ground.
     """
     from terragrip.ground.classification.classifier import GroundClassifier
 
@@ -108,7 +109,7 @@ def predict(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Tell the ground of every window.
+    """Recognise the ground of every window.
 
     A table with a row for each window: file, start, end, ground (or 'unknown'), novelty, and the probability of every ground.
     """
@@ -117,7 +118,7 @@ def predict(
     from terragrip.ground.classification.classifier import GroundClassifier
 
     if others and len(logs) > 1:
-        raise InputError("there are several logs", place="--with", hint="tell one drive at a time")
+        raise InputError("there are several logs", place="--with", hint="predict one drive at a time")
     beside = [path for path in (classifier, profile, *(dbc or ()), *(others or ())) if path is not None]
     target = check_file(output, [*logs, *beside], suffixes=(".csv", ".parquet"))
     known = GroundClassifier.load(classifier)
@@ -203,7 +204,7 @@ def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
             problem = f"lasts {length:.3g} s, too short for a window of {window:.3g} s"
             raise InputError(problem, file=log, hint="give a longer log")
         wanted = "; ".join(" + ".join(s) for s in known.sensors_[-3:])
-        raise InputError("holds none of the sensors learnt", file=log, hint=f"give e.g. {wanted}")
+        raise InputError("has none of the learned sensors", file=log, hint=f"give e.g. {wanted}")
     table = table.drop(columns="recording")
     table.insert(0, "file", log.name)
     return table

@@ -26,16 +26,17 @@ def command(
     profile: ProfileFile = None,
     dbc: DbcFiles = None,
     vehicle: Annotated[
-        Path | None, typer.Option("--vehicle", metavar="FILE", help="Hold the log against this vehicle.")
+        Path | None,
+        typer.Option("--vehicle", metavar="FILE", help="Check the log against this vehicle file."),
     ] = None,
     write_profile: Annotated[
         Path | None, typer.Option("--write-profile", metavar="FILE", help="Write the proposed profile here.")
     ] = None,
 ) -> None:
-    """Tell what is in logs.
+    """Report what logs contain.
 
-    Columns, rates, gaps, ranges and doubts, what each channel may be made of, and a profile to begin with. Of several logs
-    a line for each, and the proposals for each layout of columns. Exit code 2 where a log cannot be read, or has no wheels.
+    Columns, rates, gaps, ranges and doubts, the proposed source of each channel, and a profile to start from. For several logs: a line
+    each, and the proposals for each layout of columns. Exit code 2 if a log cannot be read or has no wheels.
     """
     from terragrip.files import replacing
     from terragrip.formats import inspect

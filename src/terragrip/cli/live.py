@@ -35,7 +35,7 @@ def command(
         typer.Option(
             "--vehicle",
             metavar="FILE",
-            help="The vehicle file (YAML); of many: of each that --index gives none.",
+            help="The vehicle file (YAML); with many vehicles, that of those without one in --index.",
         ),
     ] = None,
     sink: Annotated[
@@ -48,7 +48,7 @@ def command(
     record: Annotated[
         Path | None,
         typer.Option(
-            "--record", metavar="DIR", help="Keep all that comes in and out; goes on where it broke off."
+            "--record", metavar="DIR", help="Keep all inputs and outputs; continues where it stopped."
         ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
@@ -61,7 +61,7 @@ def command(
         typer.Option(
             "--held",
             metavar="CHANNEL=S",
-            help="A channel repeated between updates S seconds apart: ground_speed=0.2.",
+            help="A channel that repeats its value between updates S seconds apart: ground_speed=0.2.",
         ),
     ] = None,
     settings: Annotated[
@@ -69,13 +69,13 @@ def command(
         typer.Option(
             "--settings",
             metavar="FILE",
-            help="Estimates of an earlier log of this machine: take their noise and held channels.",
+            help="Estimates of an earlier log of this machine: use their noise and held channels.",
         ),
     ] = None,
-    ground: Annotated[bool, typer.Option("--ground", help="Tell where the ground changes.")] = False,
+    ground: Annotated[bool, typer.Option("--ground", help="Report where the ground changes.")] = False,
     library: Annotated[
         Path | None,
-        typer.Option("--library", metavar="FILE", help="Known soils (terragrip soils): tell which it is."),
+        typer.Option("--library", metavar="FILE", help="Known soils (terragrip soils): also name the soil."),
     ] = None,
     setpoint: Annotated[
         str | None,
@@ -86,34 +86,34 @@ def command(
         ),
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(metavar="M/S", help="The ground speed wanted, for --setpoint.")
+        float | None, typer.Option(metavar="M/S", help="Desired ground speed, for --setpoint.")
     ] = None,
     index: Annotated[
         Path | None,
         typer.Option(
             "--index",
             metavar="TABLE",
-            help="Of many vehicles: a CSV with the columns name, vehicle, profile.",
+            help="For many vehicles: a CSV with the columns name, vehicle, profile.",
         ),
     ] = None,
     max_vehicles: Annotated[
-        int, typer.Option(metavar="COUNT", min=1, help="Of many vehicles: most at once.")
+        int, typer.Option(metavar="COUNT", min=1, help="For many vehicles: the greatest number at once.")
     ] = 256,
     memory: Annotated[
-        str, typer.Option(metavar="AMOUNT", help="Of many vehicles: no other is begun above so much.")
+        str, typer.Option(metavar="AMOUNT", help="For many vehicles: no new one starts above this memory.")
     ] = "4GB",
     duration: Annotated[
-        float | None, typer.Option(metavar="S", min=0.0, help="Stop after so many seconds.")
+        float | None, typer.Option(metavar="S", min=0.0, help="Stop after this many seconds.")
     ] = None,
     log_format: LogFormat = LogForm.text,
     quiet: Quiet = False,
 ) -> None:
     """Estimate while the machine drives.
 
-    Samples from any number of sources, estimates to any number of sinks; Ctrl-C ends it with the record whole.
+    Receives samples from any number of sources and sends estimates to any number of sinks. Ctrl-C ends it with a complete record.
 
     Many vehicles in one process: --source 'mqtt://HOST/field/{vehicle}/sample' --sink 'mqtt://HOST/field/{vehicle}', with --index or
-    --vehicle; each has its estimator, and its record DIR/NAME.
+    --vehicle; each has its own estimator and its record DIR/NAME.
     """
     import asyncio
     import logging
@@ -150,7 +150,9 @@ def command(
         service = _one(source, sink or [], vehicle, profile, record, options)
         screen = partial(table, service)
     elif settings is not None:
-        raise InputError("are one machine's", place="--settings", hint="put noise into the vehicle files")
+        raise InputError(
+            "are those of one machine", place="--settings", hint="put the noise into the vehicle files"
+        )
     else:
         from terragrip.live.many.status import table as table_of_many
 
@@ -244,7 +246,7 @@ def _held(pairs: list[str]) -> dict[str, float]:
             period = 0.0
         if not is_channel(name) or not 0.0 < period < 1e4:
             raise InputError(
-                f"{pair!r} is no channel and period", place="--held", hint="write ground_speed=0.2"
+                f"{pair!r} is not a channel and a period", place="--held", hint="write ground_speed=0.2"
             )
         result[name] = period
     return result
@@ -256,7 +258,7 @@ def _setpoint(text: str | None, speed: float | None) -> tuple[float, float] | No
         return None
     if text is None or speed is None:
         raise InputError(
-            "one is of no use without the other",
+            "neither works without the other",
             place="--setpoint, --speed",
             hint="--setpoint 0.11 --speed 1.5",
         )
@@ -268,7 +270,7 @@ def _setpoint(text: str | None, speed: float | None) -> tuple[float, float] | No
         return (float(text[:-1]) / 100 if text.endswith("%") else float(text)), speed
     except ValueError:
         raise InputError(
-            f"{text!r} is no slip and no file of advice",
+            f"{text!r} is neither a slip nor a file of advice",
             place="--setpoint",
             hint="write 0.11, 11% or advice.json",
         ) from None

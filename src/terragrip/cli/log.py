@@ -26,7 +26,7 @@ class LogForm(StrEnum):
 
 LogFormat = Annotated[
     LogForm,
-    typer.Option("--log-format", help="json: one JSON object a line on standard error, nothing elsewhere."),
+    typer.Option("--log-format", help="json: one JSON object per line on standard error, nothing elsewhere."),
 ]
 
 

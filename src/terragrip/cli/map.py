@@ -36,17 +36,17 @@ def command(
         float | None,
         typer.Option(
             metavar="METRES",
-            help="Size of a cell; 1 m, for machines above a tonne the working width, or 3 m.",
+            help="Size of a cell; default 1 m, for machines above a tonne the working width, or 3 m.",
         ),
     ] = None,
-    slip: Annotated[float, typer.Option(metavar="SHARE", help="Slip that adhesion is mapped at.")] = 0.2,
+    slip: Annotated[float, typer.Option(metavar="SHARE", help="Slip at which adhesion is mapped.")] = 0.2,
     soils: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="soils.json: the curves that carry adhesion to that slip."),
+        typer.Option(metavar="FILE", help="soils.json: the curves that convert adhesion to that slip."),
     ] = None,
     ground: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="ground.json of these runs: soils by what was recognised."),
+        typer.Option(metavar="FILE", help="ground.json of these runs: their recognised soils."),
     ] = None,
     fill: Annotated[
         float, typer.Option(metavar="CELLS", help="Fill this many cells around the driven ones by kriging.")
@@ -55,7 +55,7 @@ def command(
         str,
         typer.Option(metavar="NAME", help="For .parquet and .geojson: cells, points, anomalies or changes."),
     ] = "cells",
-    datum: Annotated[str, typer.Option(metavar="CRS", help="Of latitude and longitude.")] = "EPSG:4326",
+    datum: Annotated[str, typer.Option(metavar="CRS", help="Datum of latitude and longitude.")] = "EPSG:4326",
     quiet: Quiet = False,
 ) -> None:
     """Map the ground: adhesion at one slip, soil resistance, slip, efficiency.
@@ -121,7 +121,7 @@ def summary(made: FieldMap) -> str:
         f"{runs}, cells of {made.cell:g} m, EPSG:{made.epsg}; positions around {around} in {made.datum}"
         " (--datum names another)"
     ]
-    lines.append("Median of the cells, and what 10 % to 90 % of them lie between:")
+    lines.append("Median of the cells, with the 10 % and 90 % quantiles:")
     for name, cells in made.cells.items():
         at = f" at {100 * made.reference_slip:g} % slip" if name == "adhesion" else ""
         driven = cells.count > 0

@@ -15,12 +15,12 @@ from terragrip.errors import InputError
 if TYPE_CHECKING:
     from terragrip.vehicle_maker import Made
 
-app = typer.Typer(help="Make a file to begin with.", rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(help="Make a file to start from.", rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
 @app.callback()
 def _new() -> None:
-    """Make a file to begin with."""
+    """Make a file to start from."""
 
 
 def _list_classes(wanted: bool) -> None:
@@ -37,7 +37,7 @@ def _list_classes(wanted: bool) -> None:
 @app.command("vehicle")
 def vehicle(
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="FILE", help="The vehicle file (YAML), a new one.")
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The new vehicle file (YAML).")
     ],
     machine: Annotated[
         str | None, typer.Option("--class", metavar="NAME", help="The class of machine; --list names them.")
@@ -46,24 +46,26 @@ def vehicle(
         str | None,
         typer.Option(
             metavar="WHAT",
-            help="What its log measures: torque (default), wheel-speeds or bus-speed (docs/vehicle.md).",
+            help="What its log contains: torque (default), wheel-speeds or bus-speed (docs/vehicle.md).",
         ),
     ] = None,
     torque_at: Annotated[
         str,
-        typer.Option(
-            metavar="WHERE", help="Where its torques are measured: motor or wheel (behind the gears)."
-        ),
+        typer.Option(metavar="WHERE", help="Where torques are measured: motor or wheel (after the gears)."),
     ] = "",
     name: Annotated[str, typer.Option(metavar="TEXT", help="The machine's name.")] = "",
     mass: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Mass, ready to work, e.g. '6.2 t'.")
     ] = None,
     front_mass: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Of it on the front axle, at rest.")
+        str | None, typer.Option(metavar="VALUE", help="Mass on the front axle, at rest.")
     ] = None,
-    wheelbase: Annotated[str | None, typer.Option(metavar="VALUE", help="First axle to last.")] = None,
-    track: Annotated[str | None, typer.Option(metavar="VALUE", help="Between left and right wheels.")] = None,
+    wheelbase: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Distance from the first axle to the last.")
+    ] = None,
+    track: Annotated[
+        str | None, typer.Option(metavar="VALUE", help="Distance between left and right wheels.")
+    ] = None,
     center_of_gravity_height: Annotated[
         str | None, typer.Option(metavar="VALUE", help="Above ground.")
     ] = None,
@@ -71,27 +73,28 @@ def vehicle(
     wheel_radius: Annotated[
         str | None,
         typer.Option(
-            metavar="VALUE", help="Rolling radius; the rear wheels' where the front ones are smaller."
+            metavar="VALUE", help="Rolling radius; of the rear wheels if the front ones are smaller."
         ),
     ] = None,
     front_wheel_radius: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Of a tractor's front wheels.")
+        str | None, typer.Option(metavar="VALUE", help="Rolling radius of a tractor's front wheels.")
     ] = None,
     wheel_inertia: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="Of a wheel with its geared drive, e.g. '0.2 kg m^2'.")
+        str | None,
+        typer.Option(metavar="VALUE", help="Inertia of a wheel with its geared drive, e.g. '0.2 kg m^2'."),
     ] = None,
     tire_rolling_resistance: Annotated[
-        str | None, typer.Option(metavar="VALUE", help="The tyres' own, share of the load.")
+        str | None, typer.Option(metavar="VALUE", help="Resistance of the tyres, share of the load.")
     ] = None,
     bearing_resistance: Annotated[str | None, typer.Option(metavar="VALUE", help="In N s/rad.")] = None,
     payload_x: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE",
-            help="Of a tank or hopper, for a log with the machine's mass: its centre of gravity ahead of the rear axle.",
+            help="Centre of gravity of a tank or hopper ahead of the rear axle, for a log with the machine's mass.",
         ),
     ] = None,
-    payload_z: Annotated[str | None, typer.Option(metavar="VALUE", help="The same, above ground.")] = None,
+    payload_z: Annotated[str | None, typer.Option(metavar="VALUE", help="Its height above ground.")] = None,
     drive_torque_gain: Annotated[
         str | None,
         typer.Option(metavar="VALUE", help="Standard deviation of the torques' scale, e.g. '5 %'."),
@@ -115,15 +118,15 @@ def vehicle(
             "--list",
             callback=_list_classes,
             is_eager=True,
-            help="Name the classes and what is typical of each.",
+            help="List the classes with their typical values.",
         ),
     ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Make a vehicle file.
 
-    Asks on a terminal where no class is given. What is not known is typical of the class, and its doubt widens the intervals; a table
-    says how much each missing number costs.
+    Asks on a terminal if no class is given. Unknown numbers get the class's typical values, whose uncertainty widens the intervals; a table
+    shows how much each missing number costs.
     """
     given = {
         "mass": mass,
@@ -185,7 +188,7 @@ def _choice(question: str, choices: dict[str, str], *, or_unknown: bool = False)
     while True:
         if or_unknown:
             answer = typer.prompt(
-                "number or name, or Enter where it is not known", default="", show_default=False
+                "number or name, or Enter if not known", default="", show_default=False
             ).strip()
         else:
             answer = typer.prompt("number or name").strip()
@@ -193,7 +196,7 @@ def _choice(question: str, choices: dict[str, str], *, or_unknown: bool = False)
             return str(answer)
         if answer.isdigit() and 1 <= int(answer) <= len(names):
             return names[int(answer) - 1]
-        typer.echo(f"  {answer} is none of them")
+        typer.echo(f"  {answer} is not one of them")
 
 
 def _ask_values(
@@ -209,7 +212,7 @@ def _ask_values(
     asked = fields(chosen, signals)  # type: ignore[arg-type]
     if asked:
         typer.echo(
-            "A number with its unit, or Enter where it is not known: then what is typical is taken, and its doubt counted."
+            "A number with its unit, or Enter if not known: then the typical value is used, with its uncertainty."
         )
     for field in asked:
         if field.name in known or (field.name == "payload_z" and "payload_x" not in known):
@@ -246,7 +249,7 @@ def _said(made: Made) -> str:
 
     lines = [cost_table(interval_costs(made))]
     lines.append(
-        "Computed, not measured: this machine at work on paper, each doubt alone through the filter (docs/vehicle.md)."
+        "Computed, not measured: this machine at work, with one uncertainty at a time through the filter (docs/vehicle.md)."
     )
     lacking = [
         f.name
@@ -259,7 +262,7 @@ def _said(made: Made) -> str:
         lines.append(f"Find out first: {', '.join(lacking)}. Then 'terragrip calibrate' on a log.")
     elif made.signals == "bus-speed":
         lines.append(
-            "Next: estimate a log that holds 40 s without load (headland, road), or calibrate on one."
+            "Next: estimate a log that contains 40 s without load (headland, road), or calibrate on one."
         )
     else:
         lines.append("Next: 'terragrip calibrate' on a log, then 'terragrip estimate'.")

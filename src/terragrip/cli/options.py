@@ -16,7 +16,7 @@ ProfileFiles = Annotated[
     typer.Option(
         "--profile",
         metavar="FILE",
-        help="How the log's columns become Terragrip's: a YAML file, or tractor-isobus, ros2-4wd or simulink; may be repeated: "
+        help="Profile that maps the log's columns: a YAML file, or tractor-isobus, ros2-4wd or simulink; may be repeated: "
         "one for each LOG, or for it and each --with.",
     ),
 ]
@@ -25,7 +25,7 @@ ProfileFile = Annotated[
     typer.Option(
         "--profile",
         metavar="FILE",
-        help="How the log's columns become Terragrip's: a YAML file, or tractor-isobus, ros2-4wd or simulink.",
+        help="Profile that maps the log's columns: a YAML file, or tractor-isobus, ros2-4wd or simulink.",
     ),
 ]
 DbcFiles = Annotated[
@@ -37,4 +37,4 @@ OtherSources = Annotated[
         "--with", metavar="LOG", help="Another log of the same drive, to be joined; may be repeated."
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]

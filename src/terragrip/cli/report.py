@@ -19,7 +19,7 @@ def command(
     output: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", metavar="FILE", help="The page, one HTML file; the PDF goes beside it."
+            "--output", "-o", metavar="FILE", help="The page, one HTML file; the PDF is written beside it."
         ),
     ],
     library: Annotated[
@@ -41,10 +41,10 @@ def command(
     title: Annotated[str, typer.Option(metavar="TEXT", help="The report's title.")] = "Traction report",
     quiet: Quiet = False,
 ) -> None:
-    """Put estimates on a page.
+    """Make a report of estimates.
 
-    Traction over time, adhesion curves of soils with fits and what to trust, operating points, residuals and intervals; what the
-    estimates lack is left out and said. One HTML file that loads nothing, and one PDF.
+    Traction over time, adhesion curves of soils with fits and what to trust, operating points, residuals and intervals. Sections without
+    data are left out, and a sentence says what they need. One HTML file that loads nothing, and one PDF.
     """
     from terragrip.ground.result import read as read_ground
     from terragrip.report.from_estimates import report_of

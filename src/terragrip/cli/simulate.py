@@ -30,17 +30,17 @@ def command(
         typer.Option("--output", "-o", metavar="FOLDER", help="Folder for recording, truth and vehicle."),
     ],
     seed: Annotated[
-        int | None, typer.Option(metavar="N", min=0, help="Fixes ground, noise and sensor errors.")
+        int | None, typer.Option(metavar="N", min=0, help="Random seed of ground, noise and sensor errors.")
     ] = None,
     names: Annotated[
         bool,
-        typer.Option("--list", callback=_print_names, is_eager=True, help="Name the scenarios and sets."),
+        typer.Option("--list", callback=_print_names, is_eager=True, help="List the scenarios and sets."),
     ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Simulate a drive, or a set of drives.
 
-    Writes recording, truth and vehicle file, for a set in a folder a run.
+    Writes recording, truth and vehicle file; for a set, one folder per run.
     """
     from terragrip.simulation import Scenario, set_names, set_runs, simulate, simulate_campaign
 

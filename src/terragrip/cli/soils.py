@@ -35,21 +35,21 @@ def command(
     weights: Annotated[bool, typer.Option("--weights", help="Weight bins by their samples.")] = False,
     lower: Annotated[float, typer.Option(help="Lowest slip of the bins.")] = 0.05,
     upper: Annotated[
-        float, typer.Option(help="Highest slip of the bins; on grass 0.40 as the paper.")
+        float, typer.Option(help="Highest slip of the bins; on grass 0.40, as in the paper.")
     ] = 0.60,
     width: Annotated[float, typer.Option(help="Width of a bin.")] = 0.01,
     by: Annotated[
         str,
         typer.Option(
             metavar="pull|slip",
-            help="What sorts samples into bins: the vehicle's pull, or each sample's own slip as in the paper.",
+            help="Sort samples into bins by the vehicle's pull, or by each sample's own slip as in the paper.",
         ),
     ] = "pull",
     metres: Annotated[
-        float, typer.Option(help="By pull: fewest metres of way of a bin; shorter ones are joined.")
+        float, typer.Option(help="By pull: least metres of a bin; shorter ones are joined.")
     ] = 4.0,
-    runs: Annotated[int, typer.Option(help="By pull: fewest runs of a bin.")] = 2,
-    minimum: Annotated[int, typer.Option(help="By slip: fewest samples of a bin.")] = 10,
+    runs: Annotated[int, typer.Option(help="By pull: least runs of a bin.")] = 2,
+    minimum: Annotated[int, typer.Option(help="By slip: least samples of a bin.")] = 10,
     soil: Annotated[
         str | None,
         typer.Option(
@@ -57,22 +57,23 @@ def command(
         ),
     ] = None,
     merge: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Add to this library; its twins are replaced.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Add to this library; soils of the same name are replaced."),
     ] = None,
     literature: Annotated[
         bool, typer.Option("--literature", help="Add the soils of the literature.")
     ] = False,
     compare: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Say how far these soils lie from those of this library."),
+        typer.Option(metavar="FILE", help="Report how far these soils are from those of this library."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Learn adhesion-slip curves of soils.
 
-    Pairs of slip and adhesion where vehicle and tool stand on one soil and nothing is flagged, in slip bins; a curve for each soil with
-    intervals, R2, NRMSE, what the data cannot tell, and what to drive next. Samples are sorted by the vehicle's pull, since slip answers
-    to weak and strong spots; the paper's fit, sorted by slip, stands beside it.
+    Collects slip and adhesion where vehicle and tool are on one soil and no event is flagged, in slip bins. Gives each soil's curve with
+    intervals, R2, NRMSE, what the data do not determine, and what to drive next. Samples are sorted by the vehicle's pull, since slip
+    depends on weak and strong spots; the paper's fit, sorted by slip, is given beside it.
     """
     from terragrip.errors import InputError
     from terragrip.soil.bins import BinSettings
@@ -99,14 +100,14 @@ def command(
     estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
     if soil is not None and all(path.suffix.lower() == ".json" for path in inputs):
         raise InputError(
-            "names the soil of rows or points, and there are libraries only",
+            "names the soil of rows or points, but only libraries are given",
             place="--soil",
             hint="leave it out",
         )
     library = SoilLibrary({})
     words: list[str] = []
     estimates, left = _with_adhesion(estimates)
-    words += [f"{path}: left out, it holds slip without adhesion." for path in left]
+    words += [f"{path}: left out, it has slip without adhesion." for path in left]
     if estimates:
         with progress("soils", quiet) as step:
             campaign = soils_of(estimates, curve, special, soil, step)
@@ -165,7 +166,7 @@ def _joined(library: SoilLibrary, other: SoilLibrary, path: Path) -> SoilLibrary
         raise InputError(
             f"the soil {twins[0]!r} is in another of these inputs too",
             file=path,
-            hint="rename one, or give one library with --merge, whose twins are replaced",
+            hint="rename one, or give one library with --merge, whose soils of that name are replaced",
         )
     return library.merge(other)
 
@@ -174,11 +175,13 @@ def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> s
     """Lines of text: each soil in both, the differences of adhesion over 5-60 % slip, and whether the intervals meet."""
     rows = library.compare(other)
     if not rows:
-        return f"No soil of these is in {path} too."
+        return f"None of these soils is in {path}."
     lines = [f"Compared with {path}, adhesion over 5 % to 60 % slip:"]
     for row in rows:
         meet = row["intervals_meet"]
-        sentence = "; ".join(f"intervals of {k} {'meet' if v else 'do not meet'}" for k, v in meet.items())
+        sentence = "; ".join(
+            f"intervals of {k} {'overlap' if v else 'do not overlap'}" for k, v in meet.items()
+        )
         lines.append(
             f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most"
             + (f"; {sentence}" if sentence else "")

@@ -14,12 +14,17 @@ from terragrip.errors import InputError, missing_package
 def command(
     folder: Annotated[
         Path,
-        typer.Argument(metavar="FOLDER", help="Logs, estimates, libraries; the only place read or written."),
+        typer.Argument(
+            metavar="FOLDER", help="Folder of logs, estimates and libraries; the only place read or written."
+        ),
     ] = Path(),
     address: Annotated[
-        str, typer.Option("--address", metavar="IP", help="Serve other machines too; a token is then needed.")
+        str,
+        typer.Option(
+            "--address", metavar="IP", help="Address to serve other machines too; a token is then needed."
+        ),
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 takes a free one.")] = 8750,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 chooses a free one.")] = 8750,
     live: Annotated[
         str | None, typer.Option("--live", metavar="URL", help="WebSocket of a running 'terragrip live'.")
     ] = None,
@@ -28,7 +33,7 @@ def command(
         typer.Option(
             "--public-url",
             metavar="URL",
-            help="The address by which browsers reach a reverse proxy in front; a token is then needed.",
+            help="Address at which browsers reach a reverse proxy in front; a token is then needed.",
         ),
     ] = None,
     tls_certificate: Annotated[
@@ -40,14 +45,13 @@ def command(
         typer.Option("--tls-key", metavar="PEM", help="The certificate's key, without a password."),
     ] = None,
     upload_limit: Annotated[
-        int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file taken by drop.")
+        int, typer.Option("--upload-limit", metavar="MB", min=1, help="Largest file that can be uploaded.")
     ] = 2000,
     log_format: LogFormat = LogForm.text,
 ) -> None:
     """Open the studio on a folder.
 
-    The token for other machines is made anew at each start, or taken from the environment variable
-    TERRAGRIP_TOKEN. Ctrl-C ends it.
+    The token for other machines is new at each start, or that of the environment variable TERRAGRIP_TOKEN. Ctrl-C ends the studio.
     """
     import ipaddress
 
@@ -55,19 +59,19 @@ def command(
         home = ipaddress.ip_address("127.0.0.1" if address == "localhost" else address).is_loopback
     except ValueError:
         raise InputError(
-            f"{address!r} is no IP address", place="--address", hint="give e.g. 0.0.0.0"
+            f"{address!r} is not an IP address", place="--address", hint="give e.g. 0.0.0.0"
         ) from None
     if live is not None and not live.startswith(("ws://", "wss://")):
-        raise InputError(f"{live!r} is no WebSocket address", place="--live", hint="give ws://HOST:PORT")
+        raise InputError(f"{live!r} is not a WebSocket address", place="--live", hint="give ws://HOST:PORT")
     if public_url is not None and not _is_web_address(public_url):
         raise InputError(
-            f"{public_url!r} is no web address",
+            f"{public_url!r} is not a web address",
             place="--public-url",
             hint="give https://HOST, or https://HOST/PATH",
         )
     if (tls_certificate is None) != (tls_key is None):
         raise InputError(
-            "a certificate and its key are needed both",
+            "a certificate needs its key, and a key its certificate",
             place="--tls-key" if tls_key is None else "--tls-certificate",
             hint="give both as PEM files",
         )

@@ -72,7 +72,7 @@ class MapRequest(Request):
     estimates: list[str] = Field(min_length=1)
     cell: float | None = Field(None, description="Size of a cell [m]; by the machine.")
     slip: float | None = Field(None, description="Slip that adhesion is mapped at, as a share.")
-    datum: str | None = Field(None, max_length=100, description="Of latitude and longitude.")
+    datum: str | None = Field(None, max_length=100, description="Datum of latitude and longitude.")
     library: str | None = None
     ground: str | None = None
 
