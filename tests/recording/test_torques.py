@@ -75,6 +75,7 @@ def test_a_tenth_of_a_second_is_left_to_tyres_and_filters() -> None:
 def test_without_a_cell_late_torques_are_held_against_the_wheels() -> None:
     (note,) = notes_of(without_cell(working(late=0.5, pulled=0.0)))
     assert "0.50 s behind the wheel speeds" in note
+    assert "pull that is not logged" in note
 
 
 @pytest.mark.parametrize(

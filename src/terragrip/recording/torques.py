@@ -166,7 +166,12 @@ def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         else ("ahead of", f"{'these' if towing else 'the speeds'} are")
     )
     what = "drawbar force and wheel speeds" if towing else "the wheel speeds"
+    unseen = (
+        ""
+        if towing
+        else " A tool's pull that is not logged, and that a slow speed control answers, looks the same."
+    )
     return [
         f"The drive torques are {abs(seconds):.2f} s {side} {what}, judged by the force that these require (correlation {alike:.2f}, "
-        f"{without:.2f} unshifted): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile."
+        f"{without:.2f} unshifted): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile.{unseen}"
     ]
