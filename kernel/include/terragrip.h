@@ -115,9 +115,9 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
  * step (input noise), never adapted or scaled. `r`: channel variances. `now`: the inputs at the instant of y (for a_x). */
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                          const tg_real *y, const tg_real *r, tg_step *out);
-/* The same where an input's error counts whole, as it adds up over many steps, though neighbouring steps share part of it: `shared`, variances
- * of (omega, v), n + 1 values, is what one step has less. NIS is taken without it, estimate and likelihood are not. It is part of what this step,
- * and the predictions since the last one, added to the variances; null: none. */
+/* The same where an input's error counts whole, as it adds up over many steps, though neighbouring steps share part of it: `shared`,
+ * variances of (omega, v), n + 1 values, is what one step has less. NIS is taken without it, estimate and likelihood are not. It is part
+ * of what this step, and the predictions since the last one, added to the variances; null: none. */
 tg_status tg_filter_step_shared(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                                 const tg_real *shared, const tg_real *y, const tg_real *r, tg_step *out);
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input);

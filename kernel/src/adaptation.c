@@ -1,5 +1,5 @@
-/* Adaptation of Q by the innovations (physics.md 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the difference from I of C, the
- * mean product of whitened innovations (docs/decisions/0024-whitened-innovations.md). Sensitivities to ln a_j run through the whole
+/* Adaptation of Q by the innovations (physics.md 6, the MIT rule): A = diag(a_j) descends V = tr(dS dS'), dS the difference from I of C,
+ * the mean product of whitened innovations (docs/decisions/0024-whitened-innovations.md). Sensitivities to ln a_j run through the whole
  * recursion, one lane a parameter.
  *
  * Channels are taken one by one, so S = T diag(variance) T' with T unit triangular from the gains. */

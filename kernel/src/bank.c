@@ -9,8 +9,8 @@ typedef struct { /* W by rows, and the weight of its columns */
     tg_lanes W[TG_MAX_STATES][COLUMNS_MAX], weight[COLUMNS_MAX];
 } array;
 
-/* Factor W diag(weight) W' + diag(noise) of `rows` rows by Gram-Schmidt. After each row `joining` more columns of W count, which are zero in
- * the rows below; or, where `noise` is given, the row's own column of the identity. */
+/* Factor W diag(weight) W' + diag(noise) of `rows` rows by Gram-Schmidt. After each row `joining` more columns of W count, which are zero
+ * in the rows below; or, where `noise` is given, the row's own column of the identity. */
 TG_INLINE void bank_factor(array *a, int rows, int columns, int joining, const tg_lanes *noise, tg_lanes (*u)[TG_ROWS], tg_lanes *d)
 {
     tg_lanes v[COLUMNS_MAX];

@@ -75,8 +75,8 @@ tgi_observation tgi_observe(const tg_pair *p)
     return result;
 }
 
-/* The residual mu - a g(s): its variance (a itself is uncertain: `size` is the root of E[a^2]), and by how much one SD of all constants moves it. A radius error e too much lowers mu by mu e
- * and raises slip by (1 - s) e: both lower the residual. */
+/* The residual mu - a g(s): its variance (a itself is uncertain: `size` is the root of E[a^2]), and by how much one SD of all constants
+ * moves it. A radius error e too much lowers mu by mu e and raises slip by (1 - s) e: both lower the residual. */
 typedef struct {
     tg_real adhesion, height, variance, constant;
 } tgi_measurement;

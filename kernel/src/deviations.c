@@ -28,7 +28,8 @@ static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real
     return force;
 }
 
-/* What the front axles gain and the rear axles lose: a share of the mean axle load, and what an unseen pull may move, which is at most all of rho_s. */
+/* What the front axles gain and the rear axles lose: a share of the mean axle load, and what an unseen pull may move, which is at most
+ * all of rho_s. */
 static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
 {
     const tg_settings *s = &e->settings;
@@ -80,8 +81,8 @@ static tg_real slope_spread(const tg_estimator *e)
     return e->pitch.count == 0 ? 0 : found < given ? found : given;
 }
 
-/* Work out e->deviations, a column for each constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu` adhesion and rho_s.
- * What a constant does not touch stays 0 from the start. */
+/* Work out e->deviations, a column for each constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu`
+ * adhesion and rho_s. What a constant does not touch stays 0 from the start. */
 void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
 {
     const tg_settings *s = &e->settings;

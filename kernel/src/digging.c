@@ -113,8 +113,8 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     if (!add_row(e, time, row, &since)) return 0;
     const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - s->sure * deviation, rise = slip - mean[TGI_SLIP];
     const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
-    /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that digs in.
-     * Rims are known well where slip is not; what the vehicle gains has slip's SD, which is that of the speeds, relative. */
+    /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that
+     * digs in. Rims are known well where slip is not; what the vehicle gains has slip's SD, which is that of the speeds, relative. */
     const tg_real rims = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command, command = tgi_max(rims, gain / one_point(s->command, deviation));
     const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
     const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];

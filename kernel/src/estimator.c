@@ -5,8 +5,8 @@
 
 /* ---- the filter ---- */
 
-/* The row's channels along the travel, and their variances. The accelerometer's shocks last several samples, so they are no white noise, and count
- * shock_samples times. */
+/* The row's channels along the travel, and their variances. The accelerometer's shocks last several samples, so they are no white noise,
+ * and count shock_samples times. */
 static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_real *r)
 {
     const int32_t n = e->settings.machine.wheels;

@@ -361,7 +361,8 @@ typedef struct { /* slip, and its change with omega, v and the relative radius *
     tg_real slip, wheel, ground, radius;
 } tgi_slip;
 
-/* How fast a hub moves that goes at `along` in the vehicle's direction: of a steered wheel, which points along its way, with what goes across. */
+/* How fast a hub moves that goes at `along` in the vehicle's direction: of a steered wheel, which points along its way, with what goes
+ * across. */
 TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
 {
     if (across == 0) return along;

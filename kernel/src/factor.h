@@ -20,14 +20,15 @@ typedef struct { /* a factorisation on its way from the last row to the first */
 
 /* factor.c. W and its weights, with nothing taken yet. Entries of a column beyond its last row, up to the whole lane, must be numbers. */
 tgi_gram tgi_factor_begin(tg_real *W, tg_real *weight, int columns, int stride);
-/* Take row j: project the row before off every column and divide row j's products with all rows above it by its own. Gives column j of U and
- * d_j. `joins`: the row has noise of its own. */
+/* Take row j: project the row before off every column and divide row j's products with all rows above it by its own. Gives column j of U
+ * and d_j. `joins`: the row has noise of its own. */
 void tgi_factor_row(tgi_gram *g, int j, int joins, tg_real noise, tg_real *u, tg_real *d);
 /* Take row 0 after others: there is nothing above it. */
 void tgi_factor_last(const tgi_gram *g, tg_real noise, tg_real *u, tg_real *d);
 
-/* Measurement update by one channel (Bierman 1977, V.3; Thornton's gain). `f`: U'h, zero before column `first`; `spread`: sums of d f^2 up
- * to each column. Columns of U, d and the gain (K over the residual's variance) are those after the channel; returns one over that variance. */
+/* Measurement update by one channel (Bierman 1977, V.3; Thornton's gain). `f`: U'h, zero before column `first`; `spread`: sums of d f^2
+ * up to each column. Columns of U, d and the gain (K over the residual's variance) are those after the channel; returns one over that
+ * variance. */
 TG_INLINE tg_real factor_measure(tg_real *u, tg_real *d, const tg_real *f, const tg_real *spread, int first, int rows, int stride, tg_real r,
                                  tg_real *gain)
 {

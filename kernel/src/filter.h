@@ -71,7 +71,8 @@ typedef struct { /* of P = U diag(d) U', columns `stride` apart */
 void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan *plan, tgi_result *result);
 void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *result);
 
-/* adaptation.c: initial scales; sensitivities and noise scales over this step; TG_DIVERGED and nothing changed where they leave the finite numbers. */
+/* adaptation.c: initial scales; sensitivities and noise scales over this step; TG_DIVERGED and nothing changed where they leave the
+ * finite numbers. */
 void tgi_adaptation_init(tg_filter *f);
 tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result);
 

@@ -1,7 +1,9 @@
-/* What slips tell of loads that forces do not show (R; docs/decisions/0163). A wheel whose torque hardly answers to a bump takes it in its slip: its force stays, and its adhesion
- * changes with the load. Wheels share a curve, so that of a wheel's adhesion and slip, each beyond its usual and the other wheels', mu - g' s is what the load does; g' is `bend` of the
- * secant. In a row such slips are a fraction of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches half a radius
- * apart holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond all trends is left; where there is, warp.c counts what slips hide. */
+/* What slips tell of loads that forces do not show (R; docs/decisions/0163). A wheel whose torque hardly answers to a bump takes it in
+ * its slip: its force stays, and its adhesion changes with the load. Wheels share a curve, so that of a wheel's adhesion and slip, each
+ * beyond its usual and the other wheels', mu - g' s is what the load does; g' is `bend` of the secant. In a row such slips are a fraction
+ * of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches half a
+ * radius apart holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond all trends is left; where there is,
+ * warp.c counts what slips hide. */
 #include "estimator.h"
 
 #define TG_STRETCH ((tg_real)0.25) /* wheel radii over which a product's factors are means */
@@ -20,8 +22,8 @@ static tg_real product(const tg_estimator *e, const tg_real *a, const tg_real *b
     return (sum - of_a * of_b * share) * share / (1 - share);
 }
 
-/* What two stretches say, `away` wheel radii between their middles: of the variance that loads give adhesions, and of that of the adhesions. The first counts by how far it is beyond
- * chance, of loads as the adhesions show them. */
+/* What two stretches say, `away` wheel radii between their middles: of the variance that loads give adhesions, and of that of the
+ * adhesions. The first counts by how far it is beyond chance, of loads as the adhesions show them. */
 static void take_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
 {
     tgi_hidden *h = &e->hidden;
@@ -43,7 +45,8 @@ static void take_product(tg_estimator *e, const tgi_stretch *now, const tgi_stre
     h->load = h->beyond / (h->weight + h->square / (h->count * tgi_square(shown)));
 }
 
-/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads; less, in proportion, where they follow the curve. */
+/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads; less, in proportion, where they
+ * follow the curve. */
 tg_real tgi_by_load(const tg_estimator *e, tg_real scatter)
 {
     const tgi_hidden *h = &e->hidden;
@@ -68,7 +71,8 @@ static void end_stretch(tg_estimator *e)
     memset(now, 0, sizeof *now);
 }
 
-/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh`: its weight over the length of unevenness. `flowing`: the row goes on from that one. */
+/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh`: its weight over the length of unevenness. `flowing`:
+ * the row goes on from that one. */
 void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh)
 {
     tgi_hidden *h = &e->hidden;

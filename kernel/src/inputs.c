@@ -86,13 +86,13 @@ static void judge_leaps(tg_estimator *e, double time, tg_real dt)
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the noise of two samples and what the input does beside the straight line. Each sample's noise is half of two means, so
- * that neighbouring steps share it: of one mean the variance is noise^2/2, but over many steps, over which an adhesion is averaged, it adds
- * up as noise^2 a step does. A ramp does nothing beside it; an input that
- * walks at random (Brownian bridge) or leaps at some instant in between adds the twelfth of its squared increment, and its second difference
- * has two of these squares, and six of the noise. Where the step does not end with a sample, the last value stands: its error stays the same,
- * so that `age` after it it has moved the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a
- * random walk w, of whose integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
+ * it is known but for the noise of two samples and what the input does beside the straight line. Each sample's noise is half of two
+ * means, so that neighbouring steps share it: of one mean the variance is noise^2/2, but over many steps, over which an adhesion is
+ * averaged, it adds up as noise^2 a step does. A ramp does nothing beside it; an input that walks at random (Brownian bridge) or leaps at
+ * some instant in between adds the twelfth of its squared increment, and its second difference has two of these squares, and six of the
+ * noise. Where the step does not end with a sample, the last value stands: its error stays the same, so that `age` after it it has moved
+ * the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a random walk w, of whose
+ * integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
@@ -139,9 +139,9 @@ static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_r
     return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
-/* Variance of what a wheel's speed does from one sample to the next and takes back until the third, beyond its white noise; 0 below TG_CHATTER of all
- * that it does. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than its mean. White noise, whatever
- * its size, has one half (docs/decisions/0160). */
+/* Variance of what a wheel's speed does from one sample to the next and takes back until the third, beyond its white noise; 0 below
+ * TG_CHATTER of all that it does. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than
+ * its mean. White noise, whatever its size, has one half (docs/decisions/0160). */
 tg_real tgi_chatter(const tg_hold *h, tg_real noise)
 {
     const tg_real back = h->bends / 2 - h->level, white = tgi_square(noise);

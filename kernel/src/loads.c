@@ -96,7 +96,8 @@ static void take_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg
 }
 
 /* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; beside
- * it what the vehicle carries more than the file says, with shares and a height of its own, and what hangs on the hitch. A wheel keeps at least 2 % of its static load: the model divides by it. */
+ * it what the vehicle carries more than the file says, with shares and a height of its own, and what hangs on the hitch. A wheel keeps at
+ * least 2 % of its static load: the model divides by it. */
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;

@@ -1,10 +1,11 @@
-/* The motion and the channels of physics.md 1 for an engine that knows nothing of their structure. Inlined: the wheel count is a constant. */
+/* The motion and the channels of physics.md 1 for an engine that knows nothing of their structure. Inlined: the wheel count is a
+ * constant. */
 #ifndef TG_MODEL_H
 #define TG_MODEL_H
 #include "filter.h"
 
-/* d/dt of (v, omega_1..omega_n) at the state x in row order, inputs held, but for the bearings' drag: paper eq. 3 and 2, with a slope. It is
- * the same all over a step, since mu and rho_s stay. */
+/* d/dt of (v, omega_1..omega_n) at the state x in row order, inputs held, but for the bearings' drag: paper eq. 3 and 2, with a slope. It
+ * is the same all over a step, since mu and rho_s stay. */
 TG_INLINE void model_rates(const tg_filter *f, const tg_input *u, tg_real cosine, tg_real sine, const tg_real *x, tg_real *rate, const int n)
 {
     const tg_real *const mu = x, rho = x[n];

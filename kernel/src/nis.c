@@ -1,5 +1,6 @@
 /* Normalised innovation squared where one step has less noise than the filter counts: an input's error that neighbouring steps share adds
- * up over many of them as if each step had it whole, so the filter counts it whole; a single innovation knows only its own part (decision 0096). */
+ * up over many of them as if each step had it whole, so the filter counts it whole; a single innovation knows only its own part (decision
+ * 0096). */
 #include "filter.h"
 
 tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, const tg_real *least)

@@ -33,7 +33,8 @@ TG_INLINE tg_status plan_check_input(const tg_input *u, const int n)
     return u->mass < 0 ? TG_NOT_POSITIVE : TG_OK;
 }
 
-/* The one-step map (paper eq. 2 and 3): the closed form of Runge-Kutta 4 on physics.md 1, which is affine, in equal substeps of at most TG_SUBSTEP/stiffness. */
+/* The one-step map (paper eq. 2 and 3): the closed form of Runge-Kutta 4 on physics.md 1, which is affine, in equal substeps of at most
+ * TG_SUBSTEP/stiffness. */
 TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real dt, tgi_plan *plan, const int n)
 {
     tg_passage *const p = &plan->passage;

@@ -134,8 +134,8 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
     return f->value;
 }
 
-/* Low-passed speeds tell standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis so that
- * noise does not flicker. A ground speed that is a second old no longer counts. Returns 1 where the direction has turned. */
+/* Low-passed speeds tell standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis so
+ * that noise does not flicker. A ground speed that is a second old no longer counts. Returns 1 where the direction has turned. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;

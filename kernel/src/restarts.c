@@ -69,8 +69,8 @@ void tgi_unknown_adhesion(tg_estimator *e)
     for (int b = 0; b < TG_MODES; b++) e->filter.policy.bank.probability[b] = (tg_real)1 / TG_MODES;
 }
 
-/* The direction of travel turns, and with it the signs of all that counts along it: the belief of the row before is mirrored, so that this row
- * is predicted from it. What opposed the travel drives it now, since forces go on where the motion turns. */
+/* The direction of travel turns, and with it the signs of all that counts along it: the belief of the row before is mirrored, so that
+ * this row is predicted from it. What opposed the travel drives it now, since forces go on where the motion turns. */
 void tgi_turn(tg_estimator *e)
 {
     const int32_t n = e->settings.machine.wheels, stride = tgi_stride(n);
@@ -85,8 +85,8 @@ void tgi_turn(tg_estimator *e)
     tgi_place_adhesion(&e->filter, mu);
 }
 
-/* At standstill the low-passed speeds stand for the outputs. Adhesion is held; before the first motion there is none to hold, and it is what the
- * torques say, as little known as ever. */
+/* At standstill the low-passed speeds stand for the outputs. Adhesion is held; before the first motion there is none to hold, and it is
+ * what the torques say, as little known as ever. */
 void tgi_rest(tg_estimator *e, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;

@@ -1,8 +1,9 @@
 /* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load comes and goes over the ground's
- * bumps: the force follows the load, and the estimate takes it for adhesion. Wheels at one slip share a curve, so what one wheel's adhesion does
- * beyond the others' within a few wheel radii is taken for unseen load, a variance relative to the adhesion; where only one wheel is
- * driven, what it does beyond its own mean. rho_s wanders likewise: the body pitches over the bumps, which accelerometer and pitch sensor take
- * for a slope, and soil itself takes longer to change. Lengths are in wheel radii, so a machine of another size sees its own ground. */
+ * bumps: the force follows the load, and the estimate takes it for adhesion. Wheels at one slip share a curve, so what one wheel's
+ * adhesion does beyond the others' within a few wheel radii is taken for unseen load, a variance relative to the adhesion; where only one
+ * wheel is driven, what it does beyond its own mean. rho_s wanders likewise: the body pitches over the bumps, which accelerometer and
+ * pitch sensor take for a slope, and soil itself takes longer to change. Lengths are in wheel radii, so a machine of another size sees
+ * its own ground. */
 #include "estimator.h"
 
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is what it is late for */
@@ -81,8 +82,9 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise (docs/decisions/0159), and what slips tell beside it
- * (hidden.c). Of a load that is alike over TG_LOAD_LENGTH the low-pass leaves length/(length + TG_LOAD_LENGTH) of the variance. */
+/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise
+ * (docs/decisions/0159), and what slips tell beside it (hidden.c). Of a load that is alike over TG_LOAD_LENGTH the low-pass leaves
+ * length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
     const tg_tuned *k = &e->settings.tuned;

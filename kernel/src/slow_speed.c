@@ -1,7 +1,8 @@
-/* The part of the ground speed's noise that does not average out (R): receivers filter, so that their errors stay alike for seconds to minutes.
- * While driving it cannot be separated from slip, but at rest the speed is 0, and the mean of what the sensor reads there, beyond its white noise, is
- * one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. Errors of seconds, hills that the forces
- * do not know and a late receiver show while driving: innovations that follow each other are then alike, and those of white noise are not. */
+/* The part of the ground speed's noise that does not average out (R): receivers filter, so that their errors stay alike for seconds to
+ * minutes. While driving it cannot be separated from slip, but at rest the speed is 0, and the mean of what the sensor reads there,
+ * beyond its white noise, is one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. Errors
+ * of seconds, hills that the forces do not know and a late receiver show while driving: innovations that follow each other are then
+ * alike, and those of white noise are not. */
 #include "estimator.h"
 
 #define TG_SAMPLE_AGE ((tg_real)0.288675) /* sqrt(1/12) intervals: a sample may stand for any instant of its own */
@@ -30,8 +31,8 @@ void tgi_rest_over(tg_estimator *e)
     s->count = s->mean = 0;
 }
 
-/* Take the innovation of the row's ground speed and its variance, if it was measured (else NaN); beyond `spike` SDs it counts as that. A reckoned speed,
- * or one that may be a spike, is neighbour to none. */
+/* Take the innovation of the row's ground speed and its variance, if it was measured (else NaN); beyond `spike` SDs it counts as that. A
+ * reckoned speed, or one that may be a spike, is neighbour to none. */
 void tgi_watch_innovation(tg_estimator *e, const tg_row *row, tg_real innovation, tg_real variance)
 {
     tgi_slow_speed *const s = &e->slow_speed;

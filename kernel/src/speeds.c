@@ -1,8 +1,9 @@
-/* Slip from speeds alone, where no torque is measured (docs/decisions/0110). The state is the ground speed v, its rate a, and of each wheel
- * the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel that spins
- * at rest is no special case (a steered wheel's hub moves at more than v - side yaw_rate, by what the last v tells). a is an Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are
- * driven is not known: TG_SPEED_MODES filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom
- * 1988). The same in NumPy: tests/estimation/kernel_twin/speeds.py. */
+/* Slip from speeds alone, where no torque is measured (docs/decisions/0110). The state is the ground speed v, its rate a, and of each
+ * wheel the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel
+ * that spins at rest is no special case (a steered wheel's hub moves at more than v - side yaw_rate, by what the last v tells). a is an
+ * Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are driven is not known: TG_SPEED_MODES
+ * filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom 1988). The same in NumPy:
+ * tests/estimation/kernel_twin/speeds.py. */
 #include "estimator.h"
 
 #define TG_LEVELS 3
@@ -64,8 +65,8 @@ static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
     return c ? P[0][0] + 2 * P[0][1 + c] + P[1 + c][1 + c] : P[0][0];
 }
 
-/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less, but for a ground speed
- * that the next one confirms: rims alone would hold the estimate up for ever where all wheels lose hold together. */
+/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less, but for a ground
+ * speed that the next one confirms: rims alone would hold the estimate up for ever where all wheels lose hold together. */
 static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_samples *in, tg_real huber, int32_t size)
 {
     for (int32_t k = 0; k < in->count; k++) {

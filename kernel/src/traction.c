@@ -44,8 +44,8 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED],
     c->vv = Pv[v] + lanes_sum(vv);
 }
 
-/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. The ground speed may be off for
- * long (slow_speed.c). */
+/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. The ground speed may be
+ * off for long (slow_speed.c). */
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
     c->rr += scene->roughness + scene->unseen_grade;
@@ -56,7 +56,8 @@ TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene,
 /* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
 TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 ? variance : 1); }
 
-/* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load: what a common radius error does to rho_s. */
+/* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load:
+ * what a common radius error does to rho_s. */
 TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x, const tgi_moments *restrict c, const tgi_scene *restrict scene,
                         tg_real mean, tg_real *restrict o, const int n)
 {
@@ -110,8 +111,8 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
     blank(o, TG_OUT_WHEEL_SPEED_STD, n);
 }
 
-/* All values that follow from the belief; in place of `warp`, what its adhesions are beyond all trends, they have the scene's (warp.c). Speeds
- * get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
+/* All values that follow from the belief; in place of `warp`, what its adhesions are beyond all trends, they have the scene's (warp.c).
+ * Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
 void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, const tg_belief *restrict b, const tg_real (*restrict S)[TG_MAX_CONSIDERED],
                   const tgi_scene *restrict scene, tg_real *restrict o)
 {

@@ -1,14 +1,16 @@
-/* What a stiff chassis shifts between wheels (R; docs/decisions/0144). Loads that ground unevenness moves from wheel to wheel keep their sum and
- * both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one diagonal
- * against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by side, hardly by
- * diagonal; so of that pattern only what lasts longer than unevenness does may be adhesion, or a load that hills shift (docs/decisions/0154).
- * Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along the curve, is true adhesion.
- * Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds are, and what they make is known. */
+/* What a stiff chassis shifts between wheels (R; docs/decisions/0144). Loads that ground unevenness moves from wheel to wheel keep their
+ * sum and both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one
+ * diagonal against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by
+ * side, hardly by diagonal; so of that pattern only what lasts longer than unevenness does may be adhesion, or a load that hills shift
+ * (docs/decisions/0154). Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along
+ * the curve, is true adhesion. Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds
+ * are, and what they make is known. */
 #include "estimator.h"
 
 #define TG_TRENDS 3 /* alike, along, across */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
-/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends leave patterns. */
+/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends
+ * leave patterns. */
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
@@ -51,8 +53,8 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
     c->share = driven ? 1 / (tg_real)driven : 0;
 }
 
-/* Of adhesions or slips what no trend holds. All TG_MAX_WHEELS values are read and written, so that loops are of one length: those of absent
- * wheels need only be finite. */
+/* Of adhesions or slips what no trend holds. All TG_MAX_WHEELS values are read and written, so that loops are of one length: those of
+ * absent wheels need only be finite. */
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp)
 {
     tg_lanes first = lanes_all(0), last = first;
@@ -64,7 +66,8 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
     lanes_store(warp + TG_LANES, last);
 }
 
-/* Slips of the driven wheels of a vehicle that turns at `yaw` rad/s, and the variance that the errors of the wheels' speeds give one of them in the mean. 0: they tell nothing. */
+/* Slips of the driven wheels of a vehicle that turns at `yaw` rad/s, and the variance that the errors of the wheels' speeds give one of
+ * them in the mean. 0: they tell nothing. */
 int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance)
 {
     const tg_settings *s = &e->settings;
@@ -132,8 +135,9 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
     else memset(w->slip, 0, sizeof w->slip);
 }
 
-/* A step along the curve as big as this, over what a line would make of it: one through the origin, A s/(s + c), whose tangent is `bend` of its secant, has its tangent reach
- * the asymptote at secant/(1 - bend) (docs/decisions/0163). Wheels that spin at a start slip farther. */
+/* A step along the curve as big as this, over what a line would make of it: one through the origin, A s/(s + c), whose tangent is `bend`
+ * of its secant, has its tangent reach the asymptote at secant/(1 - bend) (docs/decisions/0163). Wheels that spin at a start slip
+ * farther. */
 static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
 
 /* What of the adhesions beyond the trends is no load (n,): of what lasts, a share, for a rut does that and a hill; and what slips tell.

@@ -1,5 +1,5 @@
-/* What the head of terragrip.h promises of every function: after a refused call the object and the outputs are as they were, byte for byte; and
- * places of absent wheels are NaN in a tg_estimate, 0 in a tg_step. */
+/* What the head of terragrip.h promises of every function: after a refused call the object and the outputs are as they were, byte for
+ * byte; and places of absent wheels are NaN in a tg_estimate, 0 in a tg_step. */
 #include "check.h"
 
 enum { GUARD = 0xa5 };
@@ -152,7 +152,8 @@ static tg_settings settings_of(int n, int method, int policy)
     return s;
 }
 
-/* Places of this machine alone hold numbers; of what belongs to wheels, axles or states that it has not, and of what no method gives, NaN. */
+/* Places of this machine alone hold numbers; of what belongs to wheels, axles or states that it has not, and of what no method gives,
+ * NaN. */
 static void absent_are_nan(const tg_real *o, int n, const char *what)
 {
     static const int by_wheel[] = {TG_OUT_WHEEL_SPEED, TG_OUT_WHEEL_SPEED_STD, TG_OUT_ADHESION, TG_OUT_ADHESION_STD, TG_OUT_SLIP, TG_OUT_SLIP_STD,

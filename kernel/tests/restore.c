@@ -1,5 +1,5 @@
-/* Restoring from bytes that are not a snapshot, though their checksum fits: refused, or an estimator that runs. Meant for the build under the
- * address and the undefined-behaviour sanitizers (`make kernel-test`). */
+/* Restoring from bytes that are not a snapshot, though their checksum fits: refused, or an estimator that runs. Meant for the build under
+ * the address and the undefined-behaviour sanitizers (`make kernel-test`). */
 #include "driven.h"
 #include "fields.h"
 
@@ -43,8 +43,8 @@ static int attack(tg_estimator *e, size_t room, const uint8_t *good, uint8_t *by
     return 1;
 }
 
-/* Settings are made anew from the snapshot, so a comparison of estimators finds a missing one only where it is not 0: every byte but padding,
- * which is shorter than a real, must be in the table. */
+/* Settings are made anew from the snapshot, so a comparison of estimators finds a missing one only where it is not 0: every byte but
+ * padding, which is shorter than a real, must be in the table. */
 static void settings_are_whole(void)
 {
     tg_settings all, back;
