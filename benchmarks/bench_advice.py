@@ -2,7 +2,7 @@
 
     python benchmarks/bench_advice.py [--part NAME] [--machines 24] [--seed 0] [--write]
 
-Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/decisions/0095). Development has two parts beside its
+Machines of terragrip.simulation.families, split by kind, or of the second plant (docs/families.md). Development has two parts beside its
 own kinds: their masses and curves with coarse sensors, and grounds whose curve is no exponential (other_grounds.py). Each has a drive of
 50 to 150 s at 50 Hz, estimated with the default method and the vehicle file as its user wrote it. The true optimum is that of the soil's
 own curve and resistance, sinkage included; on the second plant by its stresses in steady motion, loads as at rest. The peer is one slip

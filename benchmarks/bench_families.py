@@ -3,7 +3,7 @@
     python benchmarks/bench_families.py [--families development held-out second-plant] [--machines 24] [--rates 100 50 20 10]
                                         [--quick] [--method bank] [--workers 2] [--write]
 
-Machines: terragrip.simulation.families, split by kind (docs/decisions/0095), and the second plant (benchmarks/second_plant), which
+Machines: terragrip.simulation.families, split by kind (docs/families.md), and the second plant (benchmarks/second_plant), which
 is held out as a whole. Nothing may be tuned on held-out, nor with its figures in sight. R² of adhesion counts all driven wheels
 together, in rows in which the machine moves. The plain filter (plain_filter.py) has the same log and vehicle file and one fixed Q
 of five, the best of them taken afterwards for each machine. Intervals: family_intervals.py. Each machine is also seen at 50 Hz

@@ -1,5 +1,5 @@
 """Development machines on grounds whose curve is no exponential: what leaving a family of curves out would show, were not all of
-ours exponentials (docs/decisions/0156). Forms of the literature that rise slower or sharper; the held-out one is not among them.
+ours exponentials (docs/advice.md). Forms of the literature that rise slower or sharper; the held-out one is not among them.
 *yielding*: what Wong and Reece's stresses under a rigid wheel of the machine's size add up to on Wong's soils (wheel_stresses.py),
 each constant drawn about the table's."""
 

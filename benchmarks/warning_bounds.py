@@ -2,7 +2,7 @@
 
     python benchmarks/warning_bounds.py [--stops 60] [--seed 0] [--write]
 
-Three grounds and sensors, all of them development (docs/decisions/0095): the development kinds; their masses and curves with the coarse
+Three grounds and sensors, all of them development (docs/families.md): the development kinds; their masses and curves with the coarse
 set of sensors; and the development kinds with soft ground whose edge is a fifth as long and whose adhesion falls twice as far.
 
 true slip: how long before the stop the mean slip, by the truth, last passed 20 % and 30 %: what a threshold gains that neither lags nor

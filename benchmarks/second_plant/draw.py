@@ -1,4 +1,4 @@
-"""Machines, grounds and drives of the second plant, drawn at random. The whole plant is held out (docs/decisions/0095)."""
+"""Machines, grounds and drives of the second plant, drawn at random. The whole plant is held out (docs/families.md)."""
 
 from __future__ import annotations
 

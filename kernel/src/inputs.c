@@ -141,7 +141,7 @@ static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_r
 
 /* Variance of what a wheel's speed does from one sample to the next and takes back until the third, beyond its white noise; 0 below
  * TG_CHATTER of all that it does. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than
- * its mean. White noise, whatever its size, has one half (docs/decisions/0160). */
+ * its mean. White noise, whatever its size, has one half (docs/decisions/0026). */
 tg_real tgi_chatter(const tg_hold *h, tg_real noise)
 {
     const tg_real back = h->bends / 2 - h->level, white = tgi_square(noise);

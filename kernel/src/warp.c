@@ -2,7 +2,7 @@
  * sum and both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one
  * diagonal against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by
  * side, hardly by diagonal; so of that pattern only what lasts longer than unevenness does may be adhesion, or a load that hills shift
- * (docs/decisions/0154). Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along
+ * (docs/decisions/0144). Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along
  * the curve, is true adhesion. Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds
  * are, and what they make is known. */
 #include "estimator.h"

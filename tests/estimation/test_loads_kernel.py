@@ -101,7 +101,7 @@ def test_both_measured_loads_are_taken():
 
 
 def test_lateral_acceleration_moves_load_to_the_outer_wheels():
-    """Through the adhesion: the same torque over another load. Of a side's wheels together; of diagonals half is told (0154)."""
+    """Through the adhesion: the same torque over another load. Of a side's wheels together; of diagonals half is told (0144)."""
     sideways = 2.0
     estimates = estimate(steady(acceleration_y=sideways), robot(), held={})
     straight = estimate(steady(), robot(), held={})

@@ -20,7 +20,7 @@ HALVES = 2
 """Parts of a cell's length whose scatter tells how much a cell's mean errs; finer ones are too alike to be so many."""
 CORRELATED = 2.5
 """Wheel radii of way over which the estimator's random error is one error: unseen loads vary over 1.25 radii to either side
-(decision 0095)."""
+(docs/families.md)."""
 LEAST_WAY = 0.05
 """Metres of wheel way; less in a cell says nothing."""
 LEAST_X = 0.1

@@ -1,4 +1,4 @@
-"""What a chassis that resists warp makes of the heights under its wheels (R; docs/decisions/0144, 0154)."""
+"""What a chassis that resists warp makes of the heights under its wheels (R; docs/decisions/0144)."""
 
 from __future__ import annotations
 

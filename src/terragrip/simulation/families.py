@@ -1,4 +1,4 @@
-"""Families of machines, grounds and sensors, and their split into development and held-out (docs/decisions/0095) (R).
+"""Families of machines, grounds and sensors, and their split into development and held-out (docs/families.md) (R).
 
 A kind says which decade of mass, which family of adhesion curves and which set of sensors; a seed draws the rest: layout,
 dimensions, ground, work and drive. Everything follows the 139 kg robot of physics.md 8 by geometric similarity: with the length
@@ -28,7 +28,7 @@ Part = Literal["development", "held-out"]
 Task = Literal["work", "healthy", "digging"]
 Chassis = Literal["sprung", "rigid", "rolling"]
 """rigid: three to eight wheels on a chassis that hardly warps, over ground so uneven that much of a wheel's load goes to the others.
-rolling: the same over hills that twist and bend under the wheels, which shifts loads for as long as a hill is (docs/decisions/0154)."""
+rolling: the same over hills that twist and bend under the wheels, which shifts loads for as long as a hill is (docs/decisions/0144)."""
 
 MASSES: dict[str, tuple[float, float]] = {
     "light": (5.0, 50.0),
@@ -40,7 +40,7 @@ MASSES: dict[str, tuple[float, float]] = {
 CURVES = tuple(SOILS_OF)
 """Families of adhesion curves: see :mod:`terragrip.simulation.family_soils`."""
 HELD_OUT: dict[str, str] = {"mass": "compact", "curve": "peaking", "sensors": "coarse"}
-"""The split, by kind (decision 0095): a machine with any of these is held out, and so is the whole second plant
+"""The split, by kind (docs/families.md): a machine with any of these is held out, and so is the whole second plant
 (benchmarks/second_plant). Nothing is tuned on held-out machines."""
 
 LOAD_VARIATION = (0.02, 0.08)
