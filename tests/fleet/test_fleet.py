@@ -434,7 +434,7 @@ def test_a_file_that_is_not_the_fleets_is_not_overwritten(place: Path, ran: Ran,
     (out / name).write_text("a season's work")
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
-    assert f"{name}: exists already, and is not a fleet's" in errors
+    assert f"{name}: exists already, and is not a fleet data set" in errors
     assert (out / name).read_text() == "a season's work"
     assert not (out / "state/logs").exists()
 

@@ -82,8 +82,8 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--source", "nothing"], "names no source"),
-        (["--source", "udp://127.0.0.1:9", "--sink", "udp://127.0.0.1"], "names no host and port"),
+        (["--source", "nothing"], "is not a source"),
+        (["--source", "udp://127.0.0.1:9", "--sink", "udp://127.0.0.1"], "has no host or no port"),
         (["--source", "udp://127.0.0.1:9", "--quiet"], "would go nowhere"),
         (["--source", "udp://127.0.0.1:9", "--held", "speed=1"], "is not a channel and a period"),
         (["--source", "udp://127.0.0.1:9", "--method", "aukf-sf"], "did you mean"),

@@ -100,7 +100,7 @@ def test_nanoseconds_since_1970_keep_their_digits():
 
 def test_what_looks_ahead_is_refused():
     profile = Profile.from_dict({"channels": {"ground_speed": {"derivative_of": ["x", "y"], "unit": "m"}}})
-    with pytest.raises(InputError, match="looks ahead"):
+    with pytest.raises(InputError, match="needs future samples"):
         Decoder(profile)
 
 

@@ -246,7 +246,7 @@ async def test_there_are_limits(everyone, short, monkeypatch):
         for name in ("a", "b", "c"):
             put(service, name, *good)
         await rows_of(service, "b", 20)
-        assert service.vehicles.refusals["c"].why == "there are 2 vehicles already; raise --max-vehicles"
+        assert service.vehicles.refusals["c"].why == "there are already 2 vehicles; raise --max-vehicles"
         monkeypatch.setattr(many_vehicles, "_REMEMBERED", 5)
         for k in range(50):
             put(service, f"more{k}", good[0])
@@ -259,7 +259,7 @@ async def test_there_are_limits(everyone, short, monkeypatch):
     small = ManyService(everyone, [NOWHERE], limits=Limits(memory=1e6))
     async with running(small):
         put(small, "a", *good)
-        assert small.vehicles.refusals["a"].why.endswith("already; raise --memory")
+        assert small.vehicles.refusals["a"].why.endswith("; raise --memory")
 
 
 async def test_a_parked_vehicle_is_predicted_for_a_while_only(everyone, short, monkeypatch):

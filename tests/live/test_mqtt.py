@@ -42,7 +42,7 @@ async def test_by_password_in_and_out(tmp_path, vehicle, short, port, monkeypatc
     assert len(estimates) == 30
     assert estimates[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][290], abs=0.05)
     assert any(
-        data["text"] == "a message was no JSON: 'no json' on machine/all" for _, data in got if "text" in data
+        data["text"] == "a message was not JSON: 'no json' on machine/all" for _, data in got if "text" in data
     )
 
 
@@ -93,10 +93,10 @@ async def test_credentials_that_others_may_read_are_refused(tmp_path, vehicle, m
     secret.write_text("password: x\n")
     secret.chmod(0o644)
     monkeypatch.setenv("TERRAGRIP_CREDENTIALS", str(secret))
-    with pytest.raises(InputError, match="others may read it"):
+    with pytest.raises(InputError, match="others can read it"):
         Service(vehicle, ["mqtt://127.0.0.1/m"])
     secret.chmod(0o600)
-    with pytest.raises(InputError, match="would travel openly"):
+    with pytest.raises(InputError, match="would be sent unencrypted"):
         Service(vehicle, ["mqtt://broker.example/m"])
     secret.write_text("pasword: x\n")
     with pytest.raises(InputError, match="line 1"):
@@ -171,5 +171,5 @@ async def test_a_broker_that_refuses_the_topic_is_named(vehicle, port):
     ("source", "sink"), [("a/#/b", "out"), ("a+/b", "out"), ("a", "out/#"), ("a", "out/+")]
 )
 async def test_wild_cards_out_of_place_are_refused(vehicle, source, sink):
-    with pytest.raises(InputError, match="wild card where none may stand"):
+    with pytest.raises(InputError, match="wild card in the wrong place"):
         Service(vehicle, [f"mqtt://127.0.0.1/{source}"], [f"mqtt://127.0.0.1/{sink}"])

@@ -123,7 +123,7 @@ def test_a_torn_end_is_cut_off_and_said(tmp_path, vehicle, short, cut):
     wal.write_bytes(wal.read_bytes()[:-cut])
     again = Pipeline(Core(vehicle, settings), tmp_path)
     assert again.core.rows in (98, 99)
-    assert "torn" in again.recorder.segment.events[-1].text
+    assert "incomplete" in again.recorder.segment.events[-1].text
     play(again, rows)
     assert_as_never_interrupted(tmp_path, short.recording, vehicle)
 

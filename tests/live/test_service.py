@@ -151,7 +151,7 @@ async def test_a_payload_that_is_no_json_or_no_number_is_named_counted_survived(
     assert counts["ground_speed"]["unreadable"] == 2
     assert counts["ground_speed"]["received"] == 98
     assert service.feeds[0].unreadable == 4
-    assert any("no JSON" in text for text in events(service, "unreadable"))
+    assert any("not JSON" in text for text in events(service, "unreadable"))
     assert any("'fast'" in text for text in events(service, "unreadable"))
 
 
@@ -258,7 +258,7 @@ def _disk_full(file: int, data: bytes) -> int:
 @pytest.mark.parametrize(
     ("source", "problem"),
     [
-        ("upd://127.0.0.1:9", "names no source"),
+        ("upd://127.0.0.1:9", "is not a source"),
         ("udp://127.0.0.1:9?speed=3", "has no option 'speed'"),
         ("udp://0.0.0.0:9", "name the senders"),
         ("udp://127.0.0.1", "names no port"),

@@ -89,7 +89,7 @@ def test_a_library_given_is_what_is_shown(
     assert main([*words, "--no-pdf", "--quiet"]) == 0
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "0.777" in html
-    assert "hard: not fitted, the library does not hold it" in html
+    assert "hard: not fitted, the library does not contain it" in html
 
 
 def test_the_pdf_is_drawn_with_text_and_brings_its_fonts(report: Path) -> None:

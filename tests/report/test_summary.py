@@ -177,7 +177,7 @@ def test_a_summary_stands_on_top_and_says_what_lacks(tmp_path: Path) -> None:
         mu, half = (float(x) for x in cells["µ, 95 % interval"].split(" ± "))
         assert 0 < half < 0.2 * mu
         assert float(cells["time [min]"]) == pytest.approx(12.0, abs=0.1)
-    assert any("What the ground allows" in one and "hard" in one for one in top.prose)
+    assert any("Best tractive efficiency" in one and "hard" in one for one in top.prose)
     assert "no position" in top.prose[-1]
     assert "no clock time" in top.prose[-1]
     assert "Left out: the logs have no position" in by_anchor(page)["path"].omitted

@@ -10,7 +10,7 @@ from terragrip._kernel import ffi, lib
 _MOST = 8
 _REFUSED = {
     lib.TG_BAD_ARGUMENT: f"more than {_MOST} pairs of one instant",
-    lib.TG_NOT_FINITE: "a step of time or distance, or a pair, that is no number",
+    lib.TG_NOT_FINITE: "a step of time or distance, or a pair, that is not a number",
     lib.TG_NOT_POSITIVE: "a negative spread",
     lib.TG_TIME_REVERSED: "a step back in time",
 }

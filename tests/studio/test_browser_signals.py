@@ -188,7 +188,7 @@ def test_a_fault_in_a_formula_stands_at_its_field(page: Any, served: Served) -> 
     page.click("#formulas summary")
     for text, fault in (
         ("slip_rl -", "cannot be read"),
-        ("slip_xx + 1", "slip_xx is no column of this run"),
+        ("slip_xx + 1", "slip_xx is not a column of this run"),
         ("slip_rl.real", "a dot"),
     ):
         formula(page, "Wrong", text)
@@ -209,7 +209,7 @@ def test_a_formula_that_a_run_cannot_be_given_leaves_the_charts_alone(
     assert page.locator(".chart").count() == 1
     assert page.locator(".note.error").count() == 0
     page.click("#formulas summary")
-    assert "no_such_column is no column of this run" in page.inner_text("#formulas .list .bad")
+    assert "no_such_column is not a column of this run" in page.inner_text("#formulas .list .bad")
 
 
 def test_any_quantity_over_any_other_of_what_the_charts_show(page: Any, served: Served, folder: Path) -> None:

@@ -43,7 +43,7 @@ def test_behind_a_proxy_the_printed_address_is_the_public_one_and_its_token_is_n
 ) -> None:
     with studio(tmp_path, "--public-url", PUBLIC, lines=2) as printed:
         shown = re.fullmatch(rf"Terragrip studio: {PUBLIC}/\?token=(\S+)", printed[0])
-        own = re.fullmatch(r"The proxy passes on to http://127\.0\.0\.1:(\d+)/\.", printed[1])
+        own = re.fullmatch(r"The proxy must forward to http://127\.0\.0\.1:(\d+)/\.", printed[1])
         assert shown, printed
         assert own, printed
 

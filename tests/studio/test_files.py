@@ -32,10 +32,10 @@ def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
     [
         ("broken.parquet", b"PAR1 and then nothing of the sort", ""),
         ("empty.csv", b"", "is empty"),
-        ("virus.exe", b"MZ", "nothing that the studio takes"),
-        ("page.html", b"<script>alert(1)</script>", "nothing that the studio takes"),
+        ("virus.exe", b"MZ", "not a file that the studio accepts"),
+        ("page.html", b"<script>alert(1)</script>", "not a file that the studio accepts"),
         ("picture.png", b"<svg onload='alert(1)'>", "is no PNG picture"),
-        ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "no picture that the studio takes"),
+        ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "not a picture that the studio accepts"),
         ("bad.yaml", b"axles: {front: {mass: -1 kg}}", ""),
         ("soils.json", b"{}", "exists already"),
         ("bomb.csv.gz", None, "unpacks to more than 34 MB"),

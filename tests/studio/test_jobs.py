@@ -94,8 +94,8 @@ def test_a_cancelled_job_leaves_nothing(client: TestClient, folder: Path) -> Non
         ({"method": "algebraic", "smooth": True}, "cannot smooth"),
         ({"output": "estimates.parquet"}, "exists already"),
         ({"output": "recording.parquet", "replace": True}, "is an input of this job"),
-        ({"output": "new.csv"}, "has another ending"),
-        ({"output": "../new.parquet"}, "no path in the studio's folder"),
+        ({"output": "new.csv"}, "has another suffix"),
+        ({"output": "../new.parquet"}, "not a path in the studio's folder"),
     ],
 )
 def test_unusable_requests_are_refused_before_work_begins(

@@ -48,7 +48,7 @@ def test_a_replay_sends_every_row_as_the_table_holds_it(client: TestClient, fold
         ("", "no live service"),
         ("replay=nothing.parquet", "no such file"),
         ("replay=vehicle.yaml", "Parquet"),
-        ("replay=../x", "no path"),
+        ("replay=../x", "not a path"),
     ],
 )
 def test_what_cannot_be_played_is_said(client: TestClient, query: str, why: str) -> None:

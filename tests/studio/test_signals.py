@@ -39,11 +39,11 @@ def test_a_fault_in_a_formula_is_one_line(client: TestClient, folder: Path) -> N
     query = {"path": RUN, "text": texts}
     said = client.get("/api/drive/formulas", params=query).json()
     assert said[0] is said[3] is None
-    assert said[1] == "formula: slip_r1 is no column of this run; did you mean slip_rr?"
+    assert said[1] == "formula: slip_r1 is not a column of this run; did you mean slip_rr?"
     assert "cannot be read" in said[2]
     (folder / "recording.parquet").unlink()
     said = client.get("/api/drive/formulas", params=query).json()
-    assert "drive_torque_rr is no column of this run" in said[3]
+    assert "drive_torque_rr is not a column of this run" in said[3]
     refused = client.get(
         "/api/drive/window", params={"path": RUN, "column": "=slip_r1", "start": 0, "end": 9}
     )

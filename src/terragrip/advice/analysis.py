@@ -139,7 +139,7 @@ def _known(best: Best, over: OverSlip) -> bool:
 
 
 def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, measured: bool) -> list[str]:
-    """What is not known and what would show it it; ``measured``: the fuel was."""
+    """What is not known and what would show it; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
     if not _known(best, curves.over):

@@ -57,7 +57,7 @@ def _refuse_foreign(store: Store) -> None:
     for name in (SOILS, REPORT, BY_SOIL):
         if store.size(name) is not None:
             raise InputError(
-                "exists already, and is not a fleet's",
+                "exists already, and is not a fleet data set",
                 file=f"{store.url}/{name}",
                 hint="name another folder with -o",
             )
@@ -74,7 +74,7 @@ def _note(store: Store, name: str, content: bytes) -> Note:
     raise InputError(
         "is damaged",
         file=f"{store.url}/{name}",
-        hint="remove it and run again: its log is then estimated anew",
+        hint="remove it and run again: its log is then estimated again",
     )
 
 

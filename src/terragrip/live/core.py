@@ -183,7 +183,7 @@ class Core:
         if refused:
             self._refuse_stamps(source, refused, out)
         if jump:
-            text = f"the clock jumped by {jump:+.5g} s; time goes on without the jump"
+            text = f"the clock jumped by {jump:+.5g} s; time continues without the jump"
             out.append(Event(self.time, "clock_jump", self.settings.sources[source], text))
         for when, time, one in accepted:
             unused = self.reorder.add(when, source, time, one)
@@ -269,7 +269,7 @@ class Core:
     def _report_changes(self, out: list[Output]) -> None:
         """Events of channels that stopped or came back."""
         for kind, source, channel in self.reorder.changes:
-            text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} comes again"
+            text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} is back"
             out.append(Event(self.time, kind, self.settings.sources[source], text))
         self.reorder.changes.clear()
 

@@ -50,7 +50,7 @@ def _from_file(path: Path) -> dict[str, str]:
         raise InputError(f"cannot be read ({why})", file=path, place=FILE, hint="check the path") from error
     if stat.S_IMODE(mode) & 0o077:
         raise InputError(
-            f"others may read it (mode {stat.S_IMODE(mode):04o})", file=path, place=FILE, hint="chmod 600"
+            f"others can read it (mode {stat.S_IMODE(mode):04o})", file=path, place=FILE, hint="chmod 600"
         )
     result: dict[str, str] = {}
     for number, line in enumerate(text.splitlines(), 1):

@@ -241,7 +241,7 @@ def _is_ours(name: str) -> bool:
 def _refuse_looking_ahead(name: str, source: Source) -> None:
     if all(one.derivative_of is not None for one in source.chain) and not source.optional:
         raise InputError(
-            "derivative_of looks ahead, which live samples cannot",
+            "derivative_of needs future samples, which do not exist live",
             place=f"channels.{name}",
             hint="give a source of the speed itself",
         )
@@ -260,5 +260,5 @@ def check_channels(profile: Profile, vehicle: Vehicle) -> None:
         raise InputError(
             f"the profile gives no {lacking[0]}",
             place="--profile",
-            hint="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed does as well",
+            hint="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed will do",
         )

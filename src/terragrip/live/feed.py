@@ -117,7 +117,7 @@ class Feed:
             parts += [f"with {', '.join(new)}"] if new else []
             self._event("schema", f"messages changed: {' and '.join(parts)}", key="schema")
         elif not useful and not self._layouts:
-            self._event("schema", f"no field is known among {', '.join(sorted(layout)[:8])}", key="schema")
+            self._event("schema", f"no known field among {', '.join(sorted(layout)[:8])}", key="schema")
         if len(self._layouts) < _LAYOUTS:
             self._layouts[layout] = None
         self._since_layout = 0

@@ -41,7 +41,7 @@ class Monitor:
         """Everything counted, as Prometheus reads it (docs/live.md)."""
         page = Metrics()
         page.add(
-            "gauge", "terragrip_live_ready", "1 where /health/ready says so.", int(self.unready() is None)
+            "gauge", "terragrip_live_ready", "1 if /health/ready answers 200.", int(self.unready() is None)
         )
         for kind, name, text, samples in self.families():
             page.add(kind, name, text, samples)
@@ -60,13 +60,13 @@ class Monitor:
         if by_channel:
             mine = core.counts.by_channel
             values = [({"channel": c, "fate": f}, mine[c][f]) for c in mine for f in FATES]
-        text = "Values by channel and what became of them, restarts of a record included."
+        text = "Values by channel and outcome, restarts of a record included."
         yield "counter", "terragrip_live_values_total", text, values
         yield counter("rows", "Rows estimated by this process.", s.rows)
         yield counter("rows_predicted", "Rows predicted in silence.", s.predicted_rows)
-        yield counter("filter_restarts", "Rows at which the filter began anew.", s.filter_restarts)
+        yield counter("filter_restarts", "Rows at which the filter restarted.", s.filter_restarts)
         yield counter("nis", "Sum of NIS over rows.", s.nis)
-        yield counter("nis_expected", "Sum of what NIS should be on average.", s.nis_expected)
+        yield counter("nis_expected", "Sum of the expected NIS.", s.nis_expected)
         if s.is_real_time:
             yield counter("delay_seconds", "Sum over rows of first sample to estimate.", s.delays)
         waiting = len(self._inbox.samples)
@@ -113,7 +113,7 @@ def add_sinks(page: Metrics, outboxes: Sequence[Outbox]) -> None:
     page.add("gauge", name("queue_messages"), "Messages waiting for a sink.", waiting)
     page.add("counter", name("sent_total"), "Messages to a sink.", [(n, box.sent) for n, box in boxes])
     lost = [(label, box.dropped) for label, box in boxes]
-    page.add("counter", name("dropped_total"), "Messages that a sink was too slow for.", lost)
+    page.add("counter", name("dropped_total"), "Messages dropped because a sink was too slow.", lost)
 
 
 def _silent(pulse: Pulse, now: float) -> str | None:

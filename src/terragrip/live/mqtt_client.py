@@ -27,17 +27,17 @@ def check(uri: Uri, wild: bool = False) -> Credentials:
     import paho.mqtt.client  # noqa: F401  # so that a missing package is said at once
 
     if not uri.host or not uri.path.strip("/"):
-        raise InputError("names no broker and topic", place=uri.text, hint="write mqtt://127.0.0.1/machine/+")
+        raise InputError("has no broker or no topic", place=uri.text, hint="write mqtt://127.0.0.1/machine/+")
     levels = uri.path.split("/")
     proper = levels.count("+") + (levels[-1] == "#") if wild else 0
     if uri.path.count("+") + uri.path.count("#") > proper:
         hint = "+ stands for one whole level, # for all at the end" if wild else "name one topic"
-        raise InputError("has a wild card where none may stand", place=uri.text, hint=hint)
+        raise InputError("has a wild card in the wrong place", place=uri.text, hint=hint)
     credentials = Credentials.find()
     if uri.scheme == "mqtts":
         _tls(uri)
     elif credentials.password and not uri.is_loopback():
-        raise InputError("the password would travel openly", place=uri.text, hint="use mqtts:")
+        raise InputError("the password would be sent unencrypted", place=uri.text, hint="use mqtts:")
     return credentials
 
 

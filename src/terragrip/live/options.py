@@ -87,7 +87,7 @@ def has_slips(estimator: TractionEstimator) -> bool:
 def _refuse_without_slips(estimator: TractionEstimator, ground: bool, setpoint: bool) -> None:
     if ground and estimator.rims:
         raise InputError(
-            "ground changes show in adhesion and soil resistance, which need drive torques",
+            "changes of the ground are found in adhesion and soil resistance, which need drive torques",
             place="--ground", hint="leave it out: the sources give speeds alone",
         )  # fmt: skip
     if setpoint and not has_slips(estimator):

@@ -37,15 +37,15 @@ def from_json(data: bytes) -> list[Fields]:
     try:
         result = json.loads(data)
     except UnicodeDecodeError:
-        raise Unreadable(f"no JSON: {len(data)} bytes that are no text") from None
+        raise Unreadable(f"not JSON: {len(data)} bytes that are not text") from None
     except (ValueError, RecursionError):
         lines = data.splitlines()
         if len(lines) > 1:
             return [fields for line in lines if line.strip() for fields in from_json(line)]
-        raise Unreadable(f"no JSON: {_short(data)}") from None
+        raise Unreadable(f"not JSON: {_short(data)}") from None
     objects = result if isinstance(result, list) else [result]
     if not all(isinstance(one, dict) for one in objects):
-        raise Unreadable(f"JSON, but no object: {_short(data)}")
+        raise Unreadable(f"JSON, but not an object: {_short(data)}")
     if data.count(b"{") == len(objects) and data.count(b"[") == (result is objects):
         return objects  # nothing is nested; braces within texts only cost a second look
     return [_flat(one) for one in objects]

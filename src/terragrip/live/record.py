@@ -107,7 +107,7 @@ class Recorder:
         if self.core.rows:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
             if torn:
-                text += f"; the last {torn} bytes were torn and are left out"
+                text += f"; the last {torn} bytes were incomplete and are left out"
             note = {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}
             self.opening = self.core.note(note)
             self.keep(self.opening, "N", note)

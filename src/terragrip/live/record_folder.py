@@ -38,7 +38,7 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
     number = last_snapshot(place) if place.is_dir() else None
     if number is None:
         raise InputError(
-            "holds no record", file=folder, hint="name a folder that terragrip live --record made"
+            "holds no record", file=folder, hint="name a folder made by 'terragrip live --record'"
         )
     core = load_snapshot(place, number)
     tables: dict[str, list[Any]] = {RECORDING: [], ESTIMATES: []}
@@ -50,7 +50,7 @@ def read_record(folder: str | os.PathLike[str]) -> tuple[Recording, Estimates]:
             tables[RECORDING].append(segment.to_recording())
             tables[ESTIMATES].append(segment.to_estimates(core.estimator).to_arrow())
     if not tables[RECORDING]:
-        raise InputError("the record holds no row yet", file=folder, hint="record some samples first")
+        raise InputError("the record has no row yet", file=folder, hint="record some samples first")
     rows = pa.concat_tables(tables[RECORDING], promote_options="default")
     metadata = tables[ESTIMATES][-1].schema.metadata
     estimates = pa.concat_tables(tables[ESTIMATES], promote_options="default").replace_schema_metadata(

@@ -60,9 +60,9 @@ class Reader:
         try:
             message = self._types.store(kind).deserialize_cdr(data, kind)
         except KeyError:
-            raise Unreadable(f"of the type {kind}, which is none of those that come with ROS 2") from None
+            raise Unreadable(f"of the type {kind}, which does not come with ROS 2") from None
         except (*DAMAGE, *self._types.errors) as error:
-            raise Unreadable(f"no {kind} ({type(error).__name__})") from error
+            raise Unreadable(f"not a {kind} ({type(error).__name__})") from error
         reader = self._topics.setdefault(topic, ros_topic(topic, self._wanted))
         result: Fields = reader.fields(message)
         stamp = reader.stamp(message)

@@ -34,7 +34,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "time": _TIME,
         "arrival": {"type": "number", "description": "s since 1970, of the row's first sample"},
         "event": _TEXT,
-        "predicted": {"type": "boolean", "description": "nothing was measured: the filter went on alone"},
+        "predicted": {"type": "boolean", "description": "nothing was measured: the filter predicted"},
     },
     GROUND: {"time": _TIME, "std": _NUMBER, "probability": _NUMBER},
     SOIL: {
@@ -51,7 +51,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "speed": _NUMBER,
         "wheel_speed": {
             "type": "object",
-            "description": "rad/s by driven wheel; advice, no command",
+            "description": "rad/s by driven wheel; advice, not a command",
             "additionalProperties": {"type": "number"},
         },
     },

@@ -153,10 +153,10 @@ class Statistics:
                 lines.append(f"{fate}: " + _by_number(by))
         late, received = core.counts.total("late"), core.counts.total("received")
         if late > 0.01 * received:
-            lines.append(f"{late} of {received} values came too late: a longer --window takes them in")
+            lines.append(f"{late} of {received} values came too late: a longer --window accepts them")
         lossy = {box.uri.name: box.dropped for box in self._outboxes if box.dropped}
         if lossy:
-            lines.append("messages that sinks were too slow for: " + _by_number(lossy))
+            lines.append("messages dropped by slow sinks: " + _by_number(lossy))
         if core.learner is not None and core.estimator is not None:
             lines += _learned(*core.learner.used(core.estimator))
         if self.event_counts:

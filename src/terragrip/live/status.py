@@ -91,7 +91,7 @@ def head(service: Service) -> list[str]:
     ]  # fmt: skip
     if s.last is not None:
         e = s.last.estimate
-        state = "predicted, nothing comes in" if s.last.predicted else e.event or "driving"
+        state = "predicted, nothing received" if s.last.predicted else e.event or "driving"
         lines.append(
             f"{state}   v {e.ground_speed:.2f} ± {e.ground_speed_std:.2f} m/s"
             + (

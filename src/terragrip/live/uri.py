@@ -35,7 +35,7 @@ class Uri:
             port = parts.port
         except ValueError as error:
             raise InputError(
-                f"{head}:… is no URI ({error})", place=f"--{role}", hint="write host:port"
+                f"{head}:… is not a URI ({error})", place=f"--{role}", hint="write host:port"
             ) from error
         if parts.username or parts.password:
             raise InputError(
@@ -45,7 +45,7 @@ class Uri:
         if not colon or scheme not in schemes:
             hint = suggestion(scheme, schemes, f"give one of {', '.join(f'{s}:' for s in schemes)}")
             raise InputError(
-                f"{head[:20]!r} names no {role} that Terragrip knows", place=f"--{role}", hint=hint
+                f"{head[:20]!r} is not a {role} that Terragrip knows", place=f"--{role}", hint=hint
             )
         # The fragment sign is a wild card of MQTT, not the beginning of a fragment.
         rest = text[len(head) + 1 :]

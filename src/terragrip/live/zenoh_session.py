@@ -56,7 +56,7 @@ def config(uri: Uri) -> Any:
             result.insert_json5("connect/exit_on_failure", "true")
     except zenoh.ZError as error:
         raise InputError(
-            "names no endpoint", place=uri.text, hint="write connect=tcp/127.0.0.1:7447"
+            "has no endpoint", place=uri.text, hint="write connect=tcp/127.0.0.1:7447"
         ) from error
     return result
 
@@ -69,5 +69,5 @@ def key_of(uri: Uri, where: str) -> str:
         return str(zenoh.KeyExpr(uri.path.strip("/")))
     except zenoh.ZError as error:
         raise InputError(
-            f"{uri.path!r} is no key expression", place=uri.text, hint=f"write zenoh:{where}"
+            f"{uri.path!r} is not a key expression", place=uri.text, hint=f"write zenoh:{where}"
         ) from error

@@ -56,12 +56,12 @@ class GatheredAdvice:
             vehicle = estimates.vehicle
             if not estimates.has_adhesion:
                 if self.samples is not None:
-                    raise InputError("it holds slip alone, others adhesion too")
+                    raise InputError("it has slip alone, others adhesion too")
                 self.known = self.known or vehicle
                 self.rows.append(slip_rows(estimates))
                 return
             if self.rows:
-                raise InputError("it holds adhesion, others slip alone")
+                raise InputError("it has adhesion, others slip alone")
             machine = machine_of(estimates, vehicle)
             if self.vehicle is None:
                 refuse_other_vehicle(estimates, machine)
@@ -99,10 +99,9 @@ def of_soils(
     """The chapter from advice and metres by soil; ``mass`` of the vehicle [kg]."""
     order = sorted(advice, key=lambda name: -way[name])
     prose = (
-        "Best efficiency is the slip at which most of the wheels' power becomes pull. Intervals hold 95 %: what the drives and "
-        "the vehicle file "
-        "leave open is in them. A gain whose interval reaches below zero is not advised. All fields hold for the ground as it "
-        "was on these drives.",
+        "Best efficiency is the slip at which most of the wheels' power becomes pull. Intervals are of 95 % and include "
+        "the uncertainties of the drives and of the vehicle file. A gain whose interval reaches below zero is not "
+        "advised. All results apply to the ground as it was on these drives.",
         *notes,
     )
     content: list[Picture | Table] = [_slips(advice, order, mass)]
@@ -123,9 +122,7 @@ def of_slip(advice: Advice, notes: Sequence[str] = ()) -> Section:
         f"Slip was within the usual band of {percent(low, 0)} to {percent(high, 0)} (ASABE EP496) in "
         f"{_share(drive, 'within')} of the driving "
         f"time, below in {_share(drive, 'below')}, above in {_share(drive, 'above')}; in parentheses 95 %, by what slip's "
-        "zero leaves open. What this ground bears, "
-        "its own best slip and "
-        "the efficiency are not known without a torque.",
+        "zero leaves open. Without a torque, the strength of this ground, its best slip and the efficiency are not known.",
         *notes,
     )
     content = [one for one in (_actions({"": advice}, [""]), _missing({"": advice}, [""])) if one is not None]
@@ -201,7 +198,7 @@ def _actions(advice: Mapping[str, Advice], order: Sequence[str]) -> Table | None
     if not rows:
         return None
     return Table(
-        "What to do. Gain: points of efficiency with their 95 % interval; a dash is a direction, or keeps what is there.",
+        "What to do. Gain: points of efficiency with their 95 % interval; a dash means a direction, or no change.",
         ("soil", "do", "why", "gain"),
         tuple(rows),
     )
@@ -218,7 +215,7 @@ def _missing(advice: Mapping[str, Advice], order: Sequence[str]) -> Table | None
     rows = tuple(
         (sentence, "all" if len(soils) == len(order) else names(soils)) for sentence, soils in of.items()
     )
-    return Table("What is not known, and what would show it it.", ("missing", "for"), rows)
+    return Table("What is not known, and which data would show it.", ("missing", "for"), rows)
 
 
 def _between(value: float, interval: tuple[float, float]) -> str:
@@ -283,6 +280,6 @@ def _picture(advice: Mapping[str, Advice], drawn: Sequence[str]) -> Picture:
     return Picture(
         "advice",
         to_svg(figure),
-        f"Efficiency over slip as these drives tell it, with what they leave open.{shown}",
+        f"Efficiency over slip according to these drives, with its uncertainty.{shown}",
         "Efficiency over slip with the best slip",
     )

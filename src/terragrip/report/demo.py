@@ -210,7 +210,7 @@ def _headlines(campaign: EstimatedCampaign, default: str) -> tuple[Headline, ...
         )
     mu = next((item for item in pooled(campaign.coverage) if item.quantity == "adhesion µ"), None)
     if mu:
-        label = "of rows hold the true µ in the 95 % interval"
+        label = "of rows have the true µ inside the 95 % interval"
         result.append(Headline(percent(mu.share()), label, f"all {len(campaign.runs)} runs"))
     return tuple(result)
 

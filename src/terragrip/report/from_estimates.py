@@ -165,7 +165,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
     for number_, file in enumerate(paths, 1):
         estimates = Estimates.read(file)
         if len(estimates) < 2:
-            raise InputError("holds fewer than two rows", file=file, hint="leave it out")
+            raise InputError("has fewer than two rows", file=file, hint="leave it out")
         if estimates.has_adhesion:
             read.gathered.add(estimates, file.stem, file=str(file))
         read.map.add(estimates, file.stem)
@@ -208,7 +208,7 @@ def _lacks(run: Run) -> list[str]:
     """What a log does not hold, and what would come with it, in clauses."""
     columns, found = set(run.estimates.columns), []
     if not run.has_adhesion:
-        found.append("no drive torque was logged, so adhesion, curves and efficiency cannot be had")
+        found.append("no drive torque was logged, so there is no adhesion, curve or efficiency")
     if not run.soils and run.has_adhesion:
         found.append("no soil label, so no curve can be learned (a column soil)")
     if not {"latitude", "longitude"} <= columns:

@@ -34,10 +34,12 @@ ALIKE_LISTED = 3
 
 def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
     """Probabilities of the soils over the drives, changes, and the confusion matrix where the recording names its soils."""
-    title = "What the ground was"
+    title = "The ground"
     with_time = [ground for ground in grounds if len(ground.timeline.time) > 1]
     if not with_time:
-        return Section("ground", title, omitted="Left out: no ground.json was given, or it holds no drive.")
+        return Section(
+            "ground", title, omitted="Left out: no ground.json was given, or it contains no drive."
+        )
     shown = sorted(with_time, key=lambda ground: -len(ground.changes))[:SHOWN]
     sim = "Simulated run" if simulated else "Run"
     content: list[Picture | Table] = []
@@ -101,7 +103,7 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
         "ground-sections",
         draw_crosses(crosses, ("estimated",), "adhesion µ"),
         f"Mean ± SD of slip and adhesion (the driven wheels' mean by load) of each of the {len(crosses)} sections between changes"
-        f"{' of the simulated runs' if simulated else ''}, in the colour of the soil it was taken for. Nothing here looks at labels.",
+        f"{' of the simulated runs' if simulated else ''}, in the colour of the recognised soil. Labels are not used here.",
         "Crosses of slip and adhesion of the sections that were found",
     )
     rows = tuple(
@@ -157,7 +159,7 @@ def events(grounds: Sequence[Ground], result: Mapping[str, Sequence[Event]] | No
     shown = [_event(run, one) for run, one in warned[:LISTED]] + others[: max(LISTED - len(warned), 0)]
     whole = len(warned) + len(others)
     caption = (
-        "Events and why each was raised."
+        "Events, with the reason for each."
         if whole <= LISTED
         else f"Events; {LISTED} of {whole}, warnings first."
     )
@@ -222,7 +224,7 @@ def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
         joined = percent(float(np.mean((true == estimated) | alike)))
         sentence += f", in {joined} with {names(ALIKE)} taken as one, which the paper could not tell apart"
     table = Table(
-        "The soil by its label (rows) and what it was taken for (columns), in shares of the row.",
+        "The soil by its label (rows) and the recognised soil (columns), in shares of the row.",
         ("label", *columns, "blocks of 0.5 s"),
         tuple(rows_),
     )

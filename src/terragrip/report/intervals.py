@@ -69,8 +69,8 @@ def draw_coverage(coverages: Sequence[Coverage]) -> str:
         ):
             shares = [item.share(level) for level in LEVELS]
             plot.plot(LEVELS, shares, color=color, marker=marker, markersize=5, label=item.quantity)
-        plot.set_xlabel("probability the interval claims")
-        plot.set_ylabel("share of rows it holds the truth in")
+        plot.set_xlabel("stated probability of the interval")
+        plot.set_ylabel("share of rows in which it covers the truth")
         plot.set_xlim(0.45, 1.0)
         plot.legend(loc="upper left")
         return to_svg(figure)
@@ -86,7 +86,7 @@ def coverage_table(coverages: Sequence[Coverage]) -> Table:
         rows.append((item.quantity, *(percent(share) for share in figures), low))
     return Table(
         "Coverage of the 95 % intervals over all simulated runs while the vehicle moves by itself, neither stuck "
-        "nor pushed by its operator (a force that no sensor tells).",
+        "nor pushed by its operator (a force that no sensor measures).",
         ("quantity", "pooled", "median run", "worst run", "runs under 90 %"),
         tuple(rows),
     )

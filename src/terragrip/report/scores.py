@@ -174,7 +174,7 @@ def truth_table(scores: Iterable[TruthScore], default: str) -> Table:
     """Mean absolute errors and 95 % coverage of every method and run."""
     listed = list(scores)
     return Table(
-        "Errors against the simulated truth and share of rows whose 95 % interval holds it, while the "
+        "Errors against the simulated truth and share of rows whose 95 % interval covers it, while the "
         "vehicle moves by itself, neither stuck nor pushed.",
         ("run, method", "R² of µ", "MAE µ", "MAE slip", "MAE ρs", "95 % µ", "95 % slip", "95 % ρs"),
         tuple(

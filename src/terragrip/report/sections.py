@@ -167,7 +167,7 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
 
 def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
     """Coverage of the intervals (of runs with a truth) and NIS of one run against chi-square."""
-    title = "Are the intervals honest?"
+    title = "Do the intervals cover the truth?"
     content: list[Picture | Table] = []
     judged = len({item.run for item in covered if item.rows})
     if judged:
@@ -175,9 +175,9 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
             Picture(
                 "coverage",
                 draw_coverage(covered),
-                f"How often the intervals hold the simulated truth, against what they claim, over {judged} "
-                f"run{'s' if judged > 1 else ''} while the vehicle moves by itself. Above the dashed line they are careful, under "
-                "it too sure.",
+                f"How often the intervals cover the simulated truth, against the stated probability, over {judged} "
+                f"run{'s' if judged > 1 else ''} while the vehicle moves by itself. Above the dashed line they are too wide, below "
+                "it too narrow.",
                 "Observed against nominal coverage of the intervals",
             ),
             coverage_table(covered),

@@ -64,12 +64,14 @@ def zero_sentence(run: Run) -> tuple[str, ...]:
 
 def histogram(run: Run) -> Section:
     """How much of the way was driven at which slip."""
-    title = f"How often which slip in {run.name}"
+    title = f"Distribution of slip in {run.name}"
     wheel = run.shown_wheel
     slip, way = _rows(run, wheel)
     if not len(slip) or way.sum() <= 0:
         return Section(
-            f"slip-histogram-{run.name}", title, omitted="Left out: no stretch of the drive tells of slip."
+            f"slip-histogram-{run.name}",
+            title,
+            omitted="Left out: slip is not known on any stretch of the drive.",
         )
     figure = new_figure(height=3.2)
     with styled():
@@ -81,13 +83,13 @@ def histogram(run: Run) -> Section:
         plot.stairs(100 * share, edges, fill=True, color=ESTIMATED, alpha=0.6, linewidth=0)
         plot.axvline(0.0, color=INK, linewidth=0.7)
         plot.set_xlabel(f"slip s, {wheel} [–]")
-        plot.set_ylabel("share of the way [%]")
+        plot.set_ylabel("share of the distance [%]")
         drawn = to_svg(figure)
     median, ninety = _weighted(slip, way, 0.5), _weighted(slip, way, 0.9)
     picture = Picture(
         f"slip-histogram-{run.name}",
         drawn,
-        f"Run {run.name}: share of the way driven at each slip. Half of it was below {number(100 * median, 1)} %, nine tenths below "
+        f"Run {run.name}: share of the distance driven at each slip. Half of it was below {number(100 * median, 1)} %, nine tenths below "
         f"{number(100 * ninety, 1)} %.",
         f"Histogram of slip by way in {run.name}",
     )
@@ -98,7 +100,7 @@ def histogram(run: Run) -> Section:
         if metres > 0
     )
     table = Table(
-        "Way by slip; what lies beyond either end is in the last bin there.",
+        "Distance by slip; values beyond either end are in the last bin there.",
         ("slip", "way [m]", "share"),
         rows,
     )
@@ -126,7 +128,7 @@ def place(run: Run) -> Section:
     rows = rows[:: max(1, len(rows) // _POINTS)]
     if not len(rows):
         return Section(
-            f"slip-map-{run.name}", title, omitted="Left out: no stretch of the drive tells of slip."
+            f"slip-map-{run.name}", title, omitted="Left out: slip is not known on any stretch of the drive."
         )
     y = np.interp(run.time[rows], instants, north[fixed] - np.median(north[fixed]))
     x = np.interp(run.time[rows], instants, east[fixed] - np.median(east[fixed]))

@@ -51,7 +51,11 @@ def section(
     prose = [_driven(driven, simulated), *_slips(result, by_part), *_allowed(curves, result, tire_resistance)]
     if warnings is not None:
         said = names([f"{count} of {kind}" for kind, count in sorted(warnings.items())])
-        prose.append(f"Warnings: {said}." if said else "No warning: nothing dug in, got stuck or pushed.")
+        prose.append(
+            f"Warnings: {said}."
+            if said
+            else "No warning: the vehicle did not dig in, get stuck or get pushed."
+        )
     if missing:
         prose.append(f"Missing: {'; '.join(missing)}.")
     content = (by_label(shares(blocks), curves, tire_resistance, by_part),) if result else ()
@@ -85,13 +89,13 @@ def by_label(
     head += ["µ, 95 % interval", "mean ρs"] * adhesion
     head += ["best η", "largest µ"] * bool(peaks)
     said = (
-        "What was done, by the track: straight passes are work, turns between them headland, what is much faster road."
+        "Work done, classified from the track: straight passes are work, turns between them headland, much faster stretches road."
         if by_part
         else "By label; transitions (vehicle and tool on different ground) are left out."
     )
     return Table(
-        f"{said} Means over the wheels and over time, stuck spells left out; the interval holds the scatter of half minutes "
-        "and what they share (zero of slip, scale of the torques)."
+        f"{said} Means over the wheels and over time, stuck spells left out; the interval covers the scatter of half minutes "
+        "and their shared errors (zero of slip, scale of the torques)."
         + (" Best η and largest µ: by the label's curve, and the slip where they lie." if peaks else ""),
         tuple(head),
         tuple(rows),
@@ -142,13 +146,7 @@ def _allowed(curves: Sequence[SoilCurves], result: Sequence[Share], tire_resista
         end = f" (driven at {percent(beside, 0)})" if np.isfinite(beside) else ""
         sure = "" if one.learned.curve.identifiability_.identifiable else ", a hint only"
         said.append(f"{one.name} {percent(at, 0)} with η {number(height, 2)}{end}{sure}")
-    return (
-        [
-            f"What the ground allows: by its curve the best tractive efficiency lies at a slip of: {'; '.join(said)}."
-        ]
-        if said
-        else []
-    )
+    return [f"Best tractive efficiency by each curve at a slip of: {'; '.join(said)}."] if said else []
 
 
 def _speed(one: Share) -> float:

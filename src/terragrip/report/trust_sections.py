@@ -20,7 +20,7 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
         return Section("trust", title, omitted=NONE_FITTED if not_fitted else NO_SOILS)
     rows = tuple(_trust_row(one) for one in curves)
     table = Table(
-        "Each fit's badge: do the data fix what was fitted (condition number; beyond 10 000 they do not), does its form follow them "
+        "Each fit's badge: do the data determine the fitted parameters (condition number below 10 000), does its form follow them "
         "(whole runs left out), how noisy the slip estimate is (median SD), and the fitted parameters as that "
         "noise leaves them and freed of it (by pull the freed count).",
         ("soil", "data fix the fit", "form follows", "slip SD", "parameter, with slip noise → freed"),
@@ -50,7 +50,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
         return Section(
             "missing",
             title,
-            omitted="Left out: the curves are the library's; 'terragrip soils' says what to drive next.",
+            omitted="Left out: the curves are the library's; 'terragrip soils' shows what to drive next.",
         )
     rows = tuple(
         (
@@ -79,7 +79,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
 
 def _nothing_missing(curves: Sequence[SoilCurves]) -> str:
     """What full bins mean, and what they do not: a count of samples, not how well a curve explains them."""
-    sentence = "Every slip bin of every soil holds enough samples."
+    sentence = "Every slip bin of every soil has enough samples."
     poor = [
         f"{one.name} (R² {number(one.learned.soil.r2, 2)})"
         for one in curves
@@ -100,7 +100,7 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
     return (
         one.name,
         _badge(badge, one.learned.soil.r2),
-        "–" if verdict is None else "yes" if verdict.follows else f"no: take {verdict.proposal}",
+        "–" if verdict is None else "yes" if verdict.follows else f"no: use {verdict.proposal}",
         number(noise.slip_std if noise else None),
         corrected,
     )
@@ -134,9 +134,7 @@ def _free_shape(one: SoilCurves) -> str:
     try:
         free = AdhesionCurve("exponential", FREE, bootstrap=0).fit_bins(one.learned.curve.bins_)
     except InputError:
-        return (
-            "The fits hold the prototype's shape and fit its scale: there are too few bins to ask for more."
-        )
+        return "The fits hold the prototype's shape and fit its scale: there are too few bins for more."
     badge = free.identifiability_
     effective = badge.effective or {}
     fixed = ", ".join(f"{name} = {number(value)}" for name, value in effective.items())

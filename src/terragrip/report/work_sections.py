@@ -23,7 +23,9 @@ def bands(every: Sequence[Blocks]) -> Section:
     result = [one for one in _ordered(shares(every)) if one.bands.sum() > 0]
     if not result:
         return Section(
-            "slip-bands", title, omitted="Left out: no labelled stretch of these drives tells of slip."
+            "slip-bands",
+            title,
+            omitted="Left out: slip is not known on any labelled stretch of these drives.",
         )
     rows = tuple(
         (one.label, number(one.bands.sum() / 60, 1), *(percent(x, 0) for x in one.bands / one.bands.sum()))
@@ -63,7 +65,7 @@ def by_hour(every: Sequence[Blocks]) -> Section:
         return Section(
             "by-hour",
             title,
-            omitted="Left out: no drive is labelled or has positions that tell what was done.",
+            omitted="Left out: no drive is labelled or has positions that show what was done.",
         )
     table = Table(
         "Minutes of each hour (of a run shorter than two and a half hours: a quarter), the way, the mean slip with its 95 % interval.",

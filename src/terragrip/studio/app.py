@@ -37,7 +37,7 @@ ROUTES = (
 )
 NOT_BUILT = (
     "The studio's pages are not built. They need Node.js 20 or newer: install it, then run `make studio` in a clone "
-    "(or install a released wheel, which holds them). The interface at /openapi.json works without them."
+    "(or install a released wheel, which contains them). The interface at /openapi.json works without them."
 )
 
 

@@ -140,7 +140,7 @@ def why(table: Estimates, recording: Recording | None, row: int) -> list[str]:
     """
     before, after = _half_seconds(table.time, row)
     if before.stop - before.start < 2 or after.stop - after.start < 2:
-        return ["Too close to the end of the drive to compare before with after."]
+        return ["Too close to an end of the drive to compare before and after."]
     if not table.has_adhesion:
         return [_of_slip(table, wheel, before, after) for wheel in table.wheels]
     sentences = []

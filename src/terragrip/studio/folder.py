@@ -67,7 +67,7 @@ class Folder:
         parts = pure.parts
         bad = not parts or pure.is_absolute() or "\\" in path or any(ord(c) < 32 for c in path)
         if bad or any(part == ".." or part.startswith(".") or len(part.encode()) > 200 for part in parts):
-            raise InputError("is no path in the studio's folder", file=path, hint="give a relative path")
+            raise InputError("is not a path in the studio's folder", file=path, hint="give a relative path")
         try:
             target = (self.root / pure).resolve()
         except (OSError, RuntimeError):
@@ -94,7 +94,7 @@ class Folder:
         target = self.resolve(path)
         if target.suffix.lower() not in suffixes:
             raise InputError(
-                "has another ending", file=path, hint=f"end the name with {' or '.join(suffixes)}"
+                "has another suffix", file=path, hint=f"end the name with {' or '.join(suffixes)}"
             )
         if target.is_dir() or not target.parent.is_dir():
             raise InputError("cannot be written there", file=path, hint="name a file in a folder that exists")

@@ -73,7 +73,7 @@ def parsed(text: str) -> ast.expr:
         raise InputError("cannot be read", place="formula", hint=ALLOWED) from None
     nodes = list(ast.walk(tree))
     if len(nodes) > MOST:
-        raise InputError("has too many parts", place="formula", hint="make two formulas of it")
+        raise InputError("has too many parts", place="formula", hint="split it into two formulas")
     for node in nodes:
         _allow(node)
     return tree
@@ -83,7 +83,7 @@ def _allow(node: ast.AST) -> None:
     """Raise InputError unless a node is arithmetic."""
     if isinstance(node, ast.Constant):
         if type(node.value) not in (int, float):
-            raise InputError(f"{str(node.value)[:20]!r} is no number", place="formula", hint=ALLOWED)
+            raise InputError(f"{str(node.value)[:20]!r} is not a number", place="formula", hint=ALLOWED)
         if isinstance(node.value, int) and node.value > sys.float_info.max:
             raise InputError("a number is too large", place="formula")
     elif isinstance(node, ast.Call):

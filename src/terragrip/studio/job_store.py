@@ -19,7 +19,7 @@ VERSION = 1
 ENDED = ("done", "failed", "cancelled", "interrupted")
 """States of a job that will not change any more."""
 STATES = ("queued", "running", *ENDED)
-INTERRUPTED = "the studio ended before it; its output is whole or absent: run the command line again"
+INTERRUPTED = "the studio ended before the job; its output is complete or absent: run the command line again"
 _COLUMNS = ("id", "kind", "title", "output", "state", "text", "words", "process")
 
 

@@ -70,7 +70,7 @@ class Jobs:
         if job.state == "queued":
             self._end(job, "cancelled", "cancelled before it began")
         elif job.state == "running":
-            self._end(job, "cancelled", "cancelled; what was not finished is removed")
+            self._end(job, "cancelled", "cancelled; unfinished output is removed")
             await self._stop()
 
     async def close(self) -> None:

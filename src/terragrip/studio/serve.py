@@ -63,9 +63,7 @@ def serve(
     if certificate is not None:
         certificate.check()
     if as_json and not (loopback and public is None) and TOKEN not in os.environ:
-        raise InputError(
-            "a token made anew would stand in the log", place="--log-format", hint=f"set {TOKEN}"
-        )
+        raise InputError("a new token would appear in the log", place="--log-format", hint=f"set {TOKEN}")
     token = None if loopback and public is None else _token()
     app = create_app(
         folder, token=token, hosts=(address,), upload_limit=upload_limit, live=live, public=public
@@ -114,9 +112,9 @@ def _say(
         flush=True,
     )
     if public is not None:
-        print(f"The proxy passes on to {own}.", flush=True)
+        print(f"The proxy must forward to {own}.", flush=True)
     elif not loopback:
-        way = "" if encrypted else "; the way there is not encrypted"
+        way = "" if encrypted else "; the connection is not encrypted"
         print(f"Anyone who knows the token can read and write this folder{way}.", flush=True)
 
 
@@ -141,7 +139,7 @@ def _bind(address: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise InputError(
-            f"{address}:{port} cannot be had ({error.strerror})", place="--port", hint="choose another, or 0"
+            f"{address}:{port} cannot be used ({error.strerror})", place="--port", hint="choose another, or 0"
         ) from error
     return listener
 

@@ -169,7 +169,7 @@ class Shown:
             return self.along(PLACES[f"axis:{name}"])
         absent = "" if recording is not None else "the recording is not in this folder"
         raise InputError(
-            f"{name} is no column of this run",
+            f"{name} is not a column of this run",
             place="formula",
             hint=suggestion(name, [*known, "time", "elapsed", "distance"], absent),
         )

@@ -66,8 +66,8 @@ def open_sinks(sinks: Sequence[str], sources: Sequence[VehicleTopics]) -> list[t
             for source in sources:
                 if source.matches(topics):
                     raise InputError(
-                        f"what it sends would come back by {source.text}", place=f"--sink {text}",
-                        hint="give it another prefix, or the source a topic of its own",
+                        f"its messages would come back by {source.text}", place=f"--sink {text}",
+                        hint="give it another prefix, or another topic to the source",
                     )  # fmt: skip
         elif scheme != "studio":
             raise InputError(

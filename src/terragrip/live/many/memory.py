@@ -32,7 +32,7 @@ def amount(text: str) -> float:
     except (ValueError, KeyError):
         value = 0.0
     if not 0.0 < value < float("inf"):
-        raise InputError(f"{text!r} is no amount of memory", place="--memory", hint="write 2GB or 500MB")
+        raise InputError(f"{text!r} is not an amount of memory", place="--memory", hint="write 2GB or 500MB")
     return value
 
 

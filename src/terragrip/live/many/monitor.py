@@ -59,7 +59,12 @@ class ManyMonitor:
         unready = self.unready()
         for kind, family, text, value in (
             ("gauge", "vehicles", "Vehicles that are estimated.", len(vehicles.runs)),
-            ("gauge", "vehicles_refused", "Vehicles that send and are not.", len(vehicles.refusals)),
+            (
+                "gauge",
+                "vehicles_refused",
+                "Vehicles that send but are not estimated.",
+                len(vehicles.refusals),
+            ),
             ("counter", "vehicle_failures_total", "Vehicles closed after a failure.", vehicles.failures),
             ("counter", "unnamed_messages_total", "Messages whose topic names no vehicle.", vehicles.unnamed),
             ("gauge", "memory_bytes", "Memory of the process.", held_now()),
@@ -67,7 +72,7 @@ class ManyMonitor:
             page.add(kind, f"terragrip_live_{family}", text, value)
         listed = vehicles.runs.keys() | unready.keys()
         ready = [({"vehicle": name}, int(name not in unready)) for name in sorted(listed)]
-        page.add("gauge", "terragrip_live_ready", "1 where /health/ready/VEHICLE says so.", ready)
+        page.add("gauge", "terragrip_live_ready", "1 if /health/ready/VEHICLE answers 200.", ready)
         alike: dict[str, Family] = {}
         for name in sorted(vehicles.runs):
             for kind, family, text, samples in self._of(name).families(by_channel=False):

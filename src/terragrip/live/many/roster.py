@@ -91,8 +91,8 @@ def _rows(index: Path) -> dict[str, tuple[Path | None, Path | None]]:
         name, place = row["name"], f"row {number}"
         if not is_name(name):
             raise InputError(
-                f"{name[:40]!r} is no name of a vehicle", file=index, place=place,
-                hint="write letters, digits and _ - . alone, as in its topic",
+                f"{name[:40]!r} is not a vehicle's name", file=index, place=place,
+                hint="use letters, digits and _ - . only, as in its topic",
             )  # fmt: skip
         if name in result:
             raise InputError(f"{name} occurs here twice", file=index, place=place, hint="keep one row")

@@ -200,7 +200,7 @@ class ManyService:
             lines.append(f"{vehicles.unnamed} messages whose topic names no vehicle")
         lossy = [f"{box.uri.name} {box.dropped}" for box in self.outboxes if box.dropped]
         if lossy:
-            lines.append("messages that sinks were too slow for: " + ", ".join(lossy))
+            lines.append("messages dropped by slow sinks: " + ", ".join(lossy))
         return "\n".join(lines)
 
 

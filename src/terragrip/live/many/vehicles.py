@@ -149,17 +149,17 @@ class Vehicles:
         now = time.monotonic()
         if now - self._reported >= _REPORT_EVERY:
             self._reported = now
-            text = f"{name[:40]!r} in a topic is no name of a vehicle: letters, digits and _ - . alone"
+            text = f"{name[:40]!r} in a topic is not a vehicle's name: letters, digits and _ - . alone"
             self.journal.event("vehicle_refused", "service", text)
 
     def _no_room(self) -> str | None:
         """Why no other vehicle may be opened; None where one may."""
         limits, count = self.limits, len(self.runs) + len(self._waiting)
         if count >= limits.vehicles:
-            return f"there are {count} vehicles already; raise --max-vehicles"
+            return f"there are already {count} vehicles; raise --max-vehicles"
         held = held_now()
         if held >= limits.memory:
-            return f"the process holds {in_words(held)} already; raise --memory"
+            return f"the process already uses {in_words(held)}; raise --memory"
         return None
 
     def open_next(self) -> bool:

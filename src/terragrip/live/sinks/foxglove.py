@@ -33,8 +33,8 @@ class FoxgloveSink:
         self.uri, self._vehicle = uri, vehicle
         if not uri.is_loopback():
             raise InputError(
-                "Foxglove's protocol asks nobody for a password", place=uri.text,
-                hint="serve on 127.0.0.1, and reach it by an SSH tunnel",
+                "Foxglove's protocol has no password", place=uri.text,
+                hint="serve on 127.0.0.1, and connect by an SSH tunnel",
             )  # fmt: skip
         self._folder = Path(uri.options["mcap"]) if "mcap" in uri.options else None
         self._context = foxglove.Context()

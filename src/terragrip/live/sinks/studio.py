@@ -88,7 +88,7 @@ class StudioSink:
         """The refusal of a client without the token, where one is set, or of a page of another site; else None."""
         origin = request.headers.get("Origin")
         if origin and not Uri("", "", host=urlsplit(origin).hostname or "").is_loopback():
-            return http.HTTPStatus.FORBIDDEN, "Pages of other sites may not listen.\n"
+            return http.HTTPStatus.FORBIDDEN, "Pages of other sites are refused.\n"
         if self._credentials.token is None:
             return None
         given = request.headers.get("Authorization", "").removeprefix("Bearer ")

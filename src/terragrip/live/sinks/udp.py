@@ -25,7 +25,7 @@ class UdpSink:
         self.packed = uri.choice("format", ("json", "doubles")) == "doubles"
         self.port = uri.port or 0
         if not self.port or not uri.host:
-            raise InputError("names no host and port", place=uri.text, hint="write udp://127.0.0.1:9871")
+            raise InputError("has no host or no port", place=uri.text, hint="write udp://127.0.0.1:9871")
 
     async def run(self, outbox: Outbox) -> None:
         """Send messages; raises Lost where the system does not let us."""

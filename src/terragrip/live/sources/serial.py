@@ -61,7 +61,7 @@ class SerialSource:
         text = line.decode("ascii", "replace").strip()
         good, damaged = sentences(text)
         if damaged or (text and not _FRAME.search(text)):
-            feed.reject(f"no whole NMEA sentence: {text[:30]!r}")
+            feed.reject(f"not a whole NMEA sentence: {text[:30]!r}")
         for sentence in good:
             if sentence.kind == "VTG" and self._has_rmc:
                 continue  # it repeats the speed of RMC

@@ -63,12 +63,10 @@ def _mercator(target: Path, path: str) -> Any:
         raster = rasterio.open(target)
         if raster.crs is None:
             raster.close()
-            raise InputError(
-                "does not say where it lies", file=path, hint="save it as PNG and place it by hand"
-            )
+            raise InputError("has no georeference", file=path, hint="save it as PNG and place it by hand")
         return WarpedVRT(raster, crs="EPSG:3857", add_alpha=raster.count in (1, 3))
     except RasterioError as error:
-        raise InputError("is no GeoTIFF that can be read", file=path, hint="export it anew") from error
+        raise InputError("is not a readable GeoTIFF", file=path, hint="export it anew") from error
 
 
 def _eight_bits(bands: Any) -> Any:

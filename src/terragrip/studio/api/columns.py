@@ -75,7 +75,9 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
         temporary.write_text(text, encoding="utf-8")
         if Profile.load(temporary) != chosen:
             raise InputError(
-                "a name here cannot be written", file=wanted.output, hint="name the wheels in plain letters"
+                "a name contains characters that cannot be written",
+                file=wanted.output,
+                hint="name the wheels in plain letters",
             )
         _read_some(log, temporary)
     return {"path": wanted.output, "text": text}

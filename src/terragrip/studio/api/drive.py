@@ -92,7 +92,7 @@ def window(
     """
     table = table_of(studio, path, version)
     if not len(table) or end <= start:
-        raise InputError("holds nothing between these times", file=path)
+        raise InputError("has no row between these times", file=path)
     shown = studio.shown.get(studio.folder.file(path))
     recording = recording_for(studio, table, column)
     cut, place, columns = shown.window(recording, column, start, end, width, axis)

@@ -198,7 +198,7 @@ def _check(temporary: Path, path: str) -> None:
             check_picture(temporary.read_bytes()[:64], temporary.suffix.lower(), path)
         elif kind is None or kind == "report":
             raise InputError(
-                "is nothing that the studio takes", hint="drop a log, a vehicle, a profile or a picture"
+                "is not a file that the studio accepts", hint="drop a log, a vehicle, a profile or a picture"
             )
     except InputError as error:
         raise InputError(error.problem, file=path, place=error.place, hint=error.hint) from None
@@ -219,6 +219,6 @@ def check_picture(head: bytes, suffix: str, path: str) -> None:
     """
     if suffix not in _MAGIC:
         known = ", ".join(sorted(PICTURES & set(_MAGIC)))
-        raise InputError("is no picture that the studio takes", file=path, hint=f"give one of {known}")
+        raise InputError("is not a picture that the studio accepts", file=path, hint=f"give one of {known}")
     if not head.startswith(_MAGIC[suffix]):
-        raise InputError(f"is no {suffix[1:].upper()} picture, whatever its name says", file=path)
+        raise InputError(f"is no {suffix[1:].upper()} picture, despite its name", file=path)

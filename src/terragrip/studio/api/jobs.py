@@ -127,7 +127,7 @@ async def add_batch(studio: Here, wanted: BatchRequest) -> dict[str, Any]:
     folder = studio.folder.resolve(wanted.output)
     if folder.is_file() or not folder.parent.is_dir():
         raise InputError(
-            "is no place for several files", file=wanted.output, hint="name a folder, new or there"
+            "is not a place for several files", file=wanted.output, hint="name a folder, new or there"
         )
     if folder.is_dir() and any(folder.iterdir()) and not wanted.replace:
         raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")

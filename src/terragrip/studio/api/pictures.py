@@ -63,7 +63,7 @@ def get_calibration(studio: Here, path: Named) -> Calibration:
     try:
         data = json.loads(file.read_bytes())
     except (ValueError, RecursionError) as error:
-        raise InputError("is not JSON", file=name, hint="remove it and calibrate anew") from error
+        raise InputError("is not JSON", file=name, hint="remove it and calibrate again") from error
     if isinstance(data, dict) and isinstance(data.get("version"), int) and data["version"] > VERSION:
         raise InputError(f"has version {data['version']}", file=name, hint="update terragrip")
     try:
@@ -71,7 +71,7 @@ def get_calibration(studio: Here, path: Named) -> Calibration:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise InputError(first["msg"], file=name, place=place, hint="remove it and calibrate anew") from None
+        raise InputError(first["msg"], file=name, place=place, hint="remove it and calibrate again") from None
 
 
 @router.put("/picture")
