@@ -42,7 +42,9 @@ async def test_by_password_in_and_out(tmp_path, vehicle, short, port, monkeypatc
     assert len(estimates) == 30
     assert estimates[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][290], abs=0.05)
     assert any(
-        data["text"] == "a message was not JSON: 'no json' on machine/all" for _, data in got if "text" in data
+        data["text"] == "a message was not JSON: 'no json' on machine/all"
+        for _, data in got
+        if "text" in data
     )
 
 
