@@ -42,6 +42,7 @@ def test_every_block_is_one_that_the_test_runs(page: Path) -> None:
     assert {language for language, _, _ in blocks(page)} <= {"python", "sh", "yaml"}
 
 
+@pytest.mark.usefixtures("undrawn")  # test_demo.py and report/test_command.py draw the figures
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_tutorial_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
