@@ -85,18 +85,3 @@ def axe_violations(tab: Any, theme: str, impacts: Sequence[str] = ()) -> list[tu
         for v in result["violations"]
         if not impacts or v["impact"] in impacts
     ]
-
-
-def axe_faults(browser: Any, served: Served, where: str, theme: str, width: int, ready: str) -> list[str]:
-    """What axe-core says of a page once `ready` is there, of any weight, and whether anything is wider than the screen."""
-    context = browser.new_context(
-        viewport={"width": width, "height": 720}, color_scheme=theme, bypass_csp=True
-    )
-    tab = context.new_page()
-    tab.set_default_timeout(180_000)
-    tab.goto(f"{served.url}/{where}")
-    tab.wait_for_selector(ready, state="attached")
-    faults = [f"{name}: {node}" for name, node in axe_violations(tab, theme)]
-    wide = tab.evaluate("() => document.documentElement.scrollWidth")
-    context.close()
-    return [*faults, *([f"{wide} pixels wide"] if wide > width else [])]

@@ -127,6 +127,10 @@ def test_a_link_to_what_is_not_there_opens_no_other_run(
 ) -> None:
     (folder / "broken.parquet").write_bytes(b"PAR1 broken")
     page.goto(f"{served.url}/#/{where}?path={path}")
-    page.wait_for_selector(f".charts:has-text('{path} holds no estimates')")
+    said = f".charts:has-text('{path} holds no estimates')"
+    page.wait_for_selector(said)
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_function("() => document.documentElement.dataset.theme === 'dark'")
+    assert page.locator(said).count() == 1  # what is drawn anew leaves it
     assert page.locator(".chart").count() == 0
     assert path in page.evaluate("() => document.querySelector('main select').selectedOptions[0].textContent")

@@ -12,14 +12,15 @@ pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser t
 pytestmark = NEEDS
 
 
-@pytest.mark.parametrize("width", [1280, 768, 390])
-def test_the_hint_covers_no_axis(page: Any, served: Served, width: int) -> None:
-    page.set_viewport_size({"width": width, "height": 844})
-    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
-    page.wait_for_selector(".charts[data-rows]")
-    page.wait_for_function("() => document.querySelector('.line').textContent !== ''")
-    line, foot = page.locator(".line").bounding_box(), page.locator(".foot").bounding_box()
-    assert line["height"] <= foot["height"] + 1
+def test_the_hint_covers_no_axis(page: Any, served: Served) -> None:
+    for width in (390, 768, 1280):
+        page.set_viewport_size({"width": width, "height": 844})
+        if width == 390:
+            page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+            page.wait_for_selector(".charts[data-rows]")
+            page.wait_for_function("() => document.querySelector('.line').textContent !== ''")
+        line, foot = page.locator(".line").bounding_box(), page.locator(".foot").bounding_box()
+        assert line["height"] <= foot["height"] + 1, width
 
 
 def test_drive_scrolls_as_one_on_a_telephone(page: Any, served: Served) -> None:
@@ -34,16 +35,13 @@ def test_drive_scrolls_as_one_on_a_telephone(page: Any, served: Served) -> None:
     assert min(heights) > 120
 
 
-@pytest.mark.parametrize(("width", "height"), [(768, 1024), (390, 844), (1280, 800)])
-def test_the_cabs_numbers_use_the_screen(page: Any, served: Served, width: int, height: int) -> None:
-    page.set_viewport_size({"width": width, "height": height})
-    page.goto(f"{served.url}/#/cab?replay=estimates.parquet")
-    page.wait_for_selector("#cab-age:has-text('ago')")
-    size = page.locator(".cab-number").first.evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
-    assert size > 0.08 * max(width, height)
-    assert (
-        page.evaluate(
-            "() => { const e = document.querySelector('main'); return e.scrollHeight - e.clientHeight; }"
-        )
-        <= 1
-    )
+def test_the_cabs_numbers_use_the_screen(page: Any, served: Served) -> None:
+    for width, height in ((390, 844), (768, 1024), (1280, 800)):
+        page.set_viewport_size({"width": width, "height": height})
+        if width == 390:
+            page.goto(f"{served.url}/#/cab?replay=estimates.parquet")
+            page.wait_for_selector("#cab-age:has-text('ago')")
+        size = page.locator(".cab-number").first.evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
+        assert size > 0.08 * max(width, height), width
+        beyond = "() => { const e = document.querySelector('main'); return e.scrollHeight - e.clientHeight; }"
+        assert page.evaluate(beyond) <= 1, width

@@ -56,7 +56,7 @@ export class Charts {
 
   constructor() {
     const forgets = [
-      onTheme(() => this.rebuild()),
+      onTheme(() => this.main && this.rebuild()), // without a run there stands why there is none
       onBrush(() => this.follow()),
       onPoint((path, time) => path === this.path && this.point(time)),
     ];
