@@ -199,6 +199,31 @@ def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(
     assert page.evaluate("() => document.activeElement.dataset.key") == "do batch"
 
 
+def test_of_several_vehicles_none_is_taken_for_the_logs(
+    page: Any, served: Served, folder: Path, made: Path
+) -> None:
+    """The first by its name would estimate the robot's log with a tractor's mass, and look as well as the right one."""
+    for name in ("a.parquet", "b.parquet"):
+        (folder / name).write_bytes((made / "recording.parquet").read_bytes())
+    for name in ("big.yaml", "robot.yaml"):
+        (folder / name).write_bytes((made / "vehicle.yaml").read_bytes())
+    page.goto(f"{served.url}/#/start?log=a.parquet")
+    page.wait_for_selector("#wizard-found:has-text('choose the vehicle')")
+    assert page.is_disabled("#wizard-go")
+    page.select_option("#wizard-vehicle", "robot.yaml")
+    page.wait_for_selector("text=ready to estimate")
+    page.click("#wizard-go")
+    page.wait_for_selector("#next-soils")
+    page.reload()  # the choice is known by the work that was done
+    page.wait_for_selector("#next-soils")
+    assert page.input_value("#wizard-vehicle") == "robot.yaml"
+    page.goto(f"{served.url}/#/start")
+    page.click("[data-key='do batch']")
+    assert page.is_disabled("#job-go")
+    page.select_option("#job-vehicle", "big.yaml")
+    assert page.is_enabled("#job-go")
+
+
 def test_a_click_on_save_counts_while_the_page_asks_the_server(
     page: Any, served: Served, folder: Path
 ) -> None:

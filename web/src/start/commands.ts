@@ -60,7 +60,7 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
     cell: () => number("cell", { min: "0.05", max: "1000", step: "any" }, "by the machine: 1 m, above a tonne 3 m"),
     slip: () => number("slip", { min: "2", max: "90", step: "any" }, "20: the slip that adhesion is given at"),
     datum: () => text("datum", "", "EPSG:4326 (WGS 84), what GNSS receivers give"),
-    vehicle: () => select("vehicle", ""),
+    vehicle: () => select("vehicle", of("vehicle").length > 1 ? "choose one" : ""),
     profile: () => select("profile", "none: the columns have our names"),
     library: () => select("library", NO_SOILS[command.kind] ?? "none: soils are not named"),
     ground: () => select("ground", "none"),

@@ -71,7 +71,7 @@ export class LogPage {
     const first = this.of("profile");
     const named = `${stemOf(this.log)}-profile.yaml`;
     this.profile = first.includes(named) ? named : "";
-    this.vehicle = this.of("vehicle")[0] ?? "";
+    this.vehicle ||= this.onlyVehicle();
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
     this.look = await this.mapping.open(freeName(this.items, `${stemOf(this.log)}-profile`, ".yaml"));
     this.drawColumns(!this.profile && !this.look?.ready);
@@ -80,6 +80,12 @@ export class LogPage {
     this.drawNext();
     await this.parts();
     await this.inspect();
+  }
+
+  /** Of several vehicles none is taken for the log's: with the wrong one every number would be wrong, and nothing would say so. */
+  private onlyVehicle(): string {
+    const vehicles = this.of("vehicle");
+    return vehicles.length === 1 ? (vehicles[0] as string) : "";
   }
 
   /** The names of the vehicle's wheels and axles, for the columns. */
@@ -126,7 +132,7 @@ export class LogPage {
 
   private drawMachine(): void {
     const vehicles = this.of("vehicle");
-    const select = choice("wizard-vehicle", vehicles, this.vehicle, "no vehicle file yet: make one below");
+    const select = choice("wizard-vehicle", vehicles, this.vehicle, vehicles.length ? "choose the log's vehicle" : "no vehicle file yet: make one below");
     select.addEventListener("change", () => {
       this.vehicle = select.value;
       void this.parts().then(() => this.inspect());
@@ -228,7 +234,7 @@ export class LogPage {
 
   private verdict(found: Inspection): string {
     const rows = `${found.rows.toLocaleString()} rows`;
-    if (found.ready) return this.vehicle ? `${rows}, ready to estimate.` : `${rows}; a vehicle file is missing.`;
+    if (found.ready) return this.vehicle ? `${rows}, ready to estimate.` : `${rows}; ${this.of("vehicle").length ? "choose the vehicle" : "a vehicle file is missing"}.`;
     return found.problem ? `Not ready: ${found.problem}` : `Not ready: ${found.missing.join("; ") || "choose the columns"}.`;
   }
 
@@ -270,8 +276,10 @@ export class LogPage {
   /** What a job made of this log, now or before the page was opened; false where it made nothing of it. */
   private keep(job: Job): boolean {
     if (job.state !== "done") return false;
-    if (job.kind === "estimate" && job.title === this.log) this.estimates = job.output;
-    else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
+    if (job.kind === "estimate" && job.title === this.log) {
+      this.estimates = job.output;
+      this.vehicle ||= this.of("vehicle").find((path) => job.command.includes(` --vehicle ${path} `)) ?? "";
+    } else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
     else return false;
     return true;
   }
