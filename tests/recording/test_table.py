@@ -263,3 +263,8 @@ def test_columns_without_use_are_named_up_to_eight(count: int, expected: str) ->
         one for one in remarks(["time", "drawbar_force", *"abcdefghijkl"[:count]]) if "not used" in one
     ]
     assert note == f"Columns that are not used: {expected}"
+
+
+def test_the_table_of_a_notebook_says_how_long_the_recording_is() -> None:
+    recording = Recording(np.array([100.0, 100.5, 107.5]), {"ground_speed": np.ones(3)})
+    assert "3 rows, 7.5 s" in recording._repr_html_()
