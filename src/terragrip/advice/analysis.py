@@ -37,7 +37,7 @@ def advise(
 ) -> tuple[dict[str, Advice], dict[str, float]]:
     """Advice by soil name ("" where rows have no label), and metres driven by soil.
 
-    ``soils``: known curves (a library), which are taken for soils of their name, the one of them where rows have no label; others
+    ``soils``: known curves (a library), used for soils of the same name (a single one also for rows without a label); others
     are learned from the estimates. Raises InputError where no table is given, or torques are in some tables only.
     """
     if not tables:

@@ -141,7 +141,7 @@ class GroundClassifier:
         return _joined([one.probabilities for one in self._judge(recordings)], len(self.classes_))
 
     def novelty(self, recordings: Iterable[Any]) -> Floats:
-        """Share (windows,) of windows on known grounds, from runs not trained on, that would look as strange.
+        """Share (windows,) of windows on known grounds, from runs not trained on, that are at least as atypical.
 
         `predict` gives unknown below ``rejection``. NaN where no usable sensor was measured. Raises InputError as `predict`.
         """
