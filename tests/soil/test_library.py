@@ -217,7 +217,8 @@ def test_digitised_points(tmp_path):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [("", "no numbers"), ("a,b\n", "no numbers"), ("1,2\n3,x\n", "row 2, column 2"), ("1,2,3\n4,5,6\n", "3 columns"),
-     ("0.1,0.2\n", "1 points"), ("500,1\n600,2\n", "slip lies between"), ("0.1,inf\n0.2,1\n", "not a number")],
+     ("0.1,0.2\n", "1 points"), ("500,1\n600,2\n", "slip lies between"), ("0.1,inf\n0.2,1\n", "not a number"),
+     ("Time [s],v\n0,0.1\n40,0.3\n", "column Time: is a log"), ("ground_speed,wheel_speed_l\n0,0\n0.5,3\n", "is a log")],
 )  # fmt: skip
 def test_digitised_points_that_are_none(tmp_path, text, expected):
     (tmp_path / "p.csv").write_text(text)

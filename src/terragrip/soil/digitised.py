@@ -13,11 +13,14 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
+from terragrip.recording.schema import is_channel
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import explaining
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.text import to_text
+
+_STAMPS = ("time", "timestamp", "zeit")
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
             "holds no numbers", file=file, hint="export the points as CSV, a pair of columns a curve"
         )
     body, head = rows[first:], rows[:first]
+    _refuse_a_log(head, file)
     width = max(len(row) for row in body)
     if width % 2:
         raise InputError(
@@ -56,6 +60,15 @@ def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
         )
     columns = [_numbers(body, i, first, file) for i in range(width)]
     return [_curve(columns[i], columns[i + 1], _title(head, i), file) for i in range(0, width, 2)]
+
+
+def _refuse_a_log(head: list[list[str]], file: str) -> None:
+    """A log's first column is time: of a short one the seconds would pass for slip in per cent."""
+    names = [cell.split("[")[0].strip() for row in head for cell in row]
+    found = next((name for name in names if is_channel(name) or name.casefold() in _STAMPS), None)
+    if found is not None:
+        hint = "estimate it first ('terragrip estimate'), and give the file of estimates"
+        raise InputError("is a log, not points of curves", file=file, place=f"column {found}", hint=hint)
 
 
 def _rows(text: str) -> list[list[str]]:
