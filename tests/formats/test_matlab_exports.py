@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from terragrip.formats import read
+from terragrip.formats import inspect, read
 from terragrip.formats.reading import read_table
 from test_logs import COUNT, SPEED, TIME
 
@@ -134,3 +134,15 @@ def test_matlab_objects_are_named_with_the_way_out(tmp_path: Path) -> None:
     table = read_table(path)
     assert "v" in table.columns
     assert any("left out: tt (timetable); save it from MATLAB" in note for note in table.notes)
+
+
+def test_a_matrix_with_a_column_for_each_wheel_is_asked_about(tmp_path: Path) -> None:
+    time = np.arange(0, 60, 0.1)
+    log = {
+        "time": time,
+        "vGround": 2 + np.sin(time),
+        "omega": np.column_stack([4 + np.sin(time + k) for k in range(4)]),
+    }
+    scipy.io.savemat(tmp_path / "run.mat", {"log": log})
+    (sentence,) = (s for s in inspect(tmp_path / "run.mat").missing if "log.omega" in s)
+    assert "'wheel_speed_fl: {from: \"log.omega[0]\"}'" in sentence

@@ -15,8 +15,8 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*$")
 _LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
 
 
-def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
-    """What is not among the channels that were found, and what follows, as sentences."""
+def missing_channels(proposals: Collection[str], has_time: bool, columns: Collection[str] = ()) -> list[str]:
+    """What is not among the channels that were found, and what follows, as sentences; ``columns`` are the log's."""
     notes = [] if has_time else ["No time column was found: it is needed, in increasing seconds."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     if not wheels and "wheel_based_speed" not in proposals:
@@ -24,6 +24,13 @@ def missing_channels(proposals: Collection[str], has_time: bool) -> list[str]:
             "No wheel speed was found, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
             "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
+        matrices = dict.fromkeys(name.removesuffix("[1]") for name in columns if name.endswith("[1]"))
+        if matrices:
+            first = next(iter(matrices))
+            notes.append(
+                f"The order of the columns in {', '.join(matrices)} is not known: if they are the wheels', say which is which in a "
+                f"profile, 'wheel_speed_fl: {{from: \"{first}[0]\"}}'."
+            )
     if "ground_speed" not in proposals:
         notes.append("No ground speed was found: slip and resistance need it; positions will do.")
     if not wheels and "wheel_based_speed" not in proposals:
