@@ -1,0 +1,257 @@
+"""What each limit of the checks of a log does: halved and doubled, false alarms and mistakes that are found.
+
+    python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
+
+The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, torque_signs.py, rolling.py,
+turn_rates.py, and torques.py's least thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the
+rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into
+every third of the drives (torques without a sign into all logs that have negative ones); one is found where its own note comes.
+--write puts the table into docs/formats.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench_real_logs import EXAMPLES, SHARED, SOURCES
+from marked import put
+from terragrip.cli import main as terragrip
+from terragrip.errors import InputError
+from terragrip.formats import read
+from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import families
+from terragrip.vehicle import Vehicle
+
+BEGIN = "<!-- made by benchmarks/bench_checks.py --write -->"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/formats.md"
+RATES = (None, 100.0, 20.0, 10.0)
+LIMITS = {
+    "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
+    "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _SHARED _COPY _DRIVEN",
+    "frozen": "_TIMES _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
+    "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
+    "copies": "_NOISY",
+    "torques": "_LEAST",
+    "stretches": "LONG DRIVING _GAP _APART _LOOKS",
+    "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
+    "rolling": "_PULLING _MOST",
+    "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
+}
+SHARES = {("pace", "_OFTEN"), ("rolling", "_MOST"), ("turn_rates", "_ALIKE")}
+"""Of which the distance to 1 is halved and doubled."""
+
+UNSIGNED = "have no sign"
+"""Words of the note on it."""
+
+Log = tuple[Recording, Vehicle]
+
+
+def drives(count: int) -> list[Log]:
+    """Development machines of each chassis."""
+    result = []
+    for chassis in ("sprung", "rigid", "rolling"):
+        for k, (kind, seed) in enumerate(families.machines("development", count, 0, chassis)):  # type: ignore[arg-type]
+            drawn = families.draw(kind, seed, rate=RATES[k % len(RATES)])
+            result.append((drawn.recording, drawn.vehicle))
+    return result
+
+
+def measured() -> list[Log]:
+    """The measured logs that have a vehicle, read as bench_real_logs does."""
+    result = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for source in SOURCES:
+            if not source.machine or source.name == "Husky":
+                continue
+            where = EXAMPLES / source.machine
+            for k, file in enumerate(sorted((SHARED / "data").glob(source.files))):
+                log, profile = source.prepare(file, folder), where / source.profile
+                if not source.profile:
+                    profile = folder / f"{source.name}{k}.yaml"
+                    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+                        terragrip(["inspect", str(log), "--write-profile", str(profile)])
+                with contextlib.suppress(InputError):
+                    result.append((read(log, profile), Vehicle.load(where / "vehicle.yaml")))
+    return result
+
+
+def changed(log: Recording, *words: str, by: Callable[[np.ndarray], Any]) -> Recording:
+    """The log with the channels of some beginning changed."""
+    channels = {n: by(v) if n.startswith(words) else v for n, v in log.channels.items()}
+    return replace(log, channels=channels, delay=None)
+
+
+def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recording, Vehicle]]:
+    """A name for each mistake, words of its note, the log with it, and the vehicle."""
+    time, some = log.time, np.random.default_rng(3).random(len(log)) < 0.01
+    middle = 0.5 * (time[0] + time[-1])
+    late = (time > middle) & (time < middle + 8.0)
+    row = int(np.argmax(late))
+    torques = [n for n in log.channels if n.startswith("drive_torque_")]
+    if any(np.nanmin(log.channels[n]) < 0 for n in torques):
+        yield "torques without sign", UNSIGNED, changed(log, "drive_torque", by=np.abs), vehicle
+    if not torques or not set(vehicle.wheels) <= set(log.wheels):
+        return
+    rims = [
+        log.channels[f"wheel_speed_{w}"] * r
+        for w, r in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)
+    ]
+
+    def held(values: np.ndarray) -> np.ndarray:
+        known = np.isfinite(values)
+        return np.where(late & known, values[row:][known[row:]][0], values)
+
+    size = float(np.nanquantile(np.abs(log.channels["ground_speed"]), 0.95))
+    yield (
+        "code 9999 in the speed",
+        "a code for",
+        changed(log, "ground_speed", by=lambda v: np.where(some, 9999.0, v)),
+        vehicle,
+    )
+    yield (
+        "code -99999 in a torque",
+        "a code for",
+        changed(log, torques[0], by=lambda v: np.where(some, -99999.0, v)),
+        vehicle,
+    )
+    yield "time in minutes", "not be in seconds", replace(log, time=time / 60), vehicle
+    yield "odometry", "odometry", log.with_channels(ground_speed=np.mean(rims, axis=0)), vehicle
+    yield "speed held 8 s", "repeats", changed(log, "ground_speed", by=held), vehicle
+    yield "torque held 8 s", "repeats", changed(log, torques[0], by=held), vehicle
+    yield "hung 8 s", "the logger hung", changed(log, "", by=held), vehicle
+    yield (
+        "torque 0 for 8 s",
+        "while all other torques",
+        changed(log, torques[0], by=lambda v: np.where(late, 0.0, v)),
+        vehicle,
+    )
+    yield (
+        "wheel 0 for 8 s",
+        "while the vehicle drives",
+        changed(log, f"wheel_speed_{vehicle.wheels[0]}", by=lambda v: np.where(late, 0.0, v)),
+        vehicle,
+    )
+    yield (
+        "speed in steps",
+        "comes in steps",
+        changed(log, "ground_speed", by=lambda v: np.round(4 * v / size) * size / 4),
+        vehicle,
+    )
+    yield "radii 8 % small", "slower than the ground", log, with_radii(vehicle, 0.92)
+    zeros = np.random.default_rng(5).random(len(log)) < 0.03
+    yield (
+        "zeros in the speed",
+        "zeros for values",
+        changed(log, "ground_speed", by=lambda v: np.where(zeros & np.isfinite(v), 0.0, v)),
+        vehicle,
+    )
+    yield "torque over 25", "drive torques over", changed(log, "drive_torque", by=lambda v: v / 25), vehicle
+    mean = np.nanmean([log.channels[n] for n in torques], axis=0)
+    yield "one torque for all", "are one signal", log.with_channels(**dict.fromkeys(torques, mean)), vehicle
+    if vehicle.track:
+        yield (
+            "track doubled",
+            "In turns the hubs",
+            log,
+            Vehicle.from_dict({**vehicle.to_dict(), "track": 2 * vehicle.track}),
+        )
+
+
+def with_radii(vehicle: Vehicle, factor: float) -> Vehicle:
+    """The vehicle with all radii times a factor."""
+    data = vehicle.to_dict()
+    for part in (data, *data["axles"].values()):
+        if part.get("wheel"):
+            part["wheel"]["radius"] *= factor
+    return Vehicle.from_dict(data)
+
+
+def counts(
+    right: list[Log], real: list[Log], wrong: list[tuple[str, str, Recording, Vehicle]]
+) -> tuple[int, int, dict[str, int]]:
+    """False alarms on drives and on measured logs, and mistakes found, by name."""
+    found = dict.fromkeys((name for name, *_ in wrong), 0)
+    for name, words, log, vehicle in wrong:
+        found[name] += any(words in note for note in unit_warnings(log, vehicle))
+    return *(sum(bool(unit_warnings(*log)) for log in logs) for logs in (right, real)), found  # type: ignore[return-value]
+
+
+@contextlib.contextmanager
+def at(module: str, name: str, value: float) -> Iterator[None]:
+    """A limit with another value, also where its module lends it to others."""
+    homes = [importlib.import_module(f"terragrip.recording.{one}") for one in LIMITS]
+    homes = [
+        home
+        for home in homes
+        if home.__name__.endswith(f".{module}") or (name.isupper() and name[0] != "_" and hasattr(home, name))
+    ]
+    usual = [getattr(home, name) for home in homes]
+    for home in homes:
+        setattr(home, name, value)
+    yield
+    for home, one in zip(homes, usual, strict=True):
+        setattr(home, name, one)
+
+
+def moved(module: str, name: str, value: float, factor: float) -> float:
+    """A limit halved or doubled; a count stays one, a share is moved by its distance to 1."""
+    if (module, name) in SHARES:
+        return 1 - (1 - value) * factor
+    return max(1, round(value * factor)) if isinstance(value, int) else value * factor
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--machines", type=int, default=24, help="of each chassis")
+    parser.add_argument("--only", nargs="+", help="these limits, as module.NAME")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/formats.md")
+    arguments = parser.parse_args()
+    right, real = drives(arguments.machines), measured()
+    wrong = [
+        case
+        for k, log in enumerate([*right, *real])
+        for case in spoilt(*log)
+        if case[1] == UNSIGNED or (k % 3 == 0 and k < len(right))
+    ]
+    usual = counts(right, real, wrong)
+    total = {name: sum(one == name for one, *_ in wrong) for name in usual[2]}
+    head = ", ".join(f"{name} {usual[2][name]} of {total[name]}" for name in total)
+    lines = [
+        f"As they are: {usual[0]} false alarms on {len(right)} drives and {usual[1]} on {len(real)} measured logs; found: {head}.",
+        "",
+        "| limit | value | halved: drives | measured | found | doubled: drives | measured | found |",
+        "|---|---:|---:|---:|---|---:|---:|---|",
+    ]
+    print(lines[0], flush=True)
+    for module, names in LIMITS.items():
+        home = importlib.import_module(f"terragrip.recording.{module}")
+        for name in names.split():
+            if arguments.only and f"{module}.{name}" not in arguments.only:
+                continue
+            value = getattr(home, name)
+            cells = [f"`{module}.{name}`", f"{value:g}"]
+            for factor in (0.5, 2.0):
+                with at(module, name, moved(module, name, value, factor)):
+                    alarms, on_real, found = counts(right, real, wrong)
+                change = [f"{n} {found[n] - usual[2][n]:+d}" for n in found if found[n] != usual[2][n]]
+                cells += [f"{alarms - usual[0]:+d}", f"{on_real - usual[1]:+d}", ", ".join(change) or "-"]
+            lines.append("| " + " | ".join(cells) + " |")
+            print(lines[-1], flush=True)
+    if arguments.write:
+        put(DOCUMENT, BEGIN, "\n".join(lines))
+        print(f"written to {DOCUMENT}")
+
+
+if __name__ == "__main__":
+    main()
