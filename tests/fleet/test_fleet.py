@@ -134,6 +134,18 @@ def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:
     assert "src=" not in page.replace('src="data:', "")
 
 
+def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
+    """A log in km/h moves the fleet's means; its note was in summary.parquet alone."""
+    log = place / "logs/b/drive4.csv"
+    table = pd.read_csv(log)
+    table["ground_speed"] *= 3.6
+    table.to_csv(log, index=False)
+    assert ran()[0] == 0
+    page = (place / "out/report.html").read_text()
+    row = page[page.index("ground_speed may be in km/h") - 400 : page.index("ground_speed may be in km/h")]
+    assert "drive4.csv" in row
+
+
 def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path, ran: Ran) -> None:
     assert ran()[0] == 0
     first = written(place / "out")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -31,6 +32,7 @@ def report_of(notes: Sequence[Row], reasons: Mapping[str, str], curves: FleetCur
         _by_soil(soils, curves),
         _curves(curves),
         _by_day(rows),
+        _remarks(rows),
         _failures(reasons),
     )
     return render(Page("Fleet report", _lead(rows, reasons), sections, tuple(_headlines(rows, reasons))))
@@ -163,6 +165,22 @@ def _draw(curves: FleetCurves) -> str:
         figure.supxlabel("slip s [–]", fontsize=9.5)
         figure.supylabel("adhesion µ [–]", fontsize=9.5)
     return to_svg(figure)
+
+
+def _remarks(rows: Sequence[Row]) -> Section:
+    """What the estimates' notes say, the same words with other numbers on one line, the rarest first: a wrong unit is rarely a fleet's."""
+    alike: dict[str, list[Row]] = {}
+    for row in rows:
+        if row["notes"]:
+            alike.setdefault(re.sub(r"\d", "", row["notes"]), []).append(row)
+    if not alike:
+        return Section("notes", "Notes on the logs", omitted="None.")
+    listed = sorted(alike.values(), key=len)[:MOST]
+    caption = "Logs with the same notes (numbers may differ), the rarest first; check units and signs before you use their means."
+    cells = ((", ".join(r["log"] for r in group[:3]), str(len(group)), group[0]["notes"]) for group in listed)
+    return Section(
+        "notes", "Notes on the logs", content=(Table(caption, ("log", "logs", "notes"), tuple(cells)),)
+    )
 
 
 def _failures(reasons: Mapping[str, str]) -> Section:
