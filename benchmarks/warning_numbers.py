@@ -28,7 +28,7 @@ from terragrip.simulation.families import Kind
 from terragrip.vehicle import Vehicle
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests/estimation"))
-from kernel_twin.immobilization import Row, Watch, pace, rows_of
+from kernel_twin.immobilization import Row, Watch, pace, rows_of, undisputed
 
 NUMBERS = (
     "pace", "memory", "usual", "sure", "ahead", "warn", "most", "rise", "high_slip", "leading", "resistance", "command",
@@ -45,7 +45,8 @@ BEGIN = "<!-- made by benchmarks/warning_numbers.py --write -->"
 
 def tallies_of(recording: Recording, vehicle: Vehicle, course: Course) -> dict[Variation, Tally]:
     """One drive under every variation."""
-    estimates = estimate(recording, vehicle)
+    with undisputed():
+        estimates = estimate(recording, vehicle)
     rows = rows_of(estimates, np.isfinite(recording.channels["ground_speed"]))
     result = {}
     for name, factor in VARIATIONS:

@@ -31,10 +31,11 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
     side->count++;
 }
 
-/* An SD without what the ground speed's delay makes of it: the warning is not to wait for that, nor to call a vehicle slow for it. */
+/* An SD without what the ground speed's delay makes of it, and what the filter has not followed of it yet: both grow as a vehicle digs in,
+ * and the warning is not to wait for that, nor to call a vehicle slow for it. */
 static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real speed)
 {
-    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - scene->late / tgi_square(speed), 0)) : deviation;
+    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - (scene->late + scene->disputed) / tgi_square(speed), 0)) : deviation;
 }
 
 /* What the powered wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import expm1, hypot, isnan, log, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.estimation import estimator
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.physics.loads import GRAVITY
@@ -46,9 +49,31 @@ class Row:
     travel_deviation: float = 0.0
 
 
+@contextmanager
+def undisputed() -> Iterator[None]:
+    """Within it estimates do not doubt a ground speed for what the filter has not followed of it.
+
+    The kernel's watch leaves that out of the SDs, and a table does not say how much of an SD it is: only without it are the table's rows
+    what the kernel sees. No figure depends on it but SDs of ground speed and slip.
+    """
+    made_by = estimator.settings_of
+
+    def settings_of(*args: Any, **more: Any) -> Any:
+        made = made_by(*args, **more)
+        made.tuned.alike_sure, made.tuned.longest_walk = 1e12, 1e-12
+        return made
+
+    estimator.settings_of = settings_of
+    try:
+        yield
+    finally:
+        estimator.settings_of = made_by
+
+
 def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     """Rows of a table of estimates as the kernel sees them; ``measured``: whether each row's ground speed was.
 
+    Estimates made within :func:`undisputed`.
     Where nothing tells the slope, the table's SD of the resistance holds hills, which the kernel's watch leaves out (decision 0149).
     Raises InputError where the estimates contain no vehicle.
     """
