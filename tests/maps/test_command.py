@@ -35,7 +35,7 @@ def test_the_map_is_written_and_summed_up(
     assert pyogrio.read_info(out, layer="anomalies")["features"] == 0
     assert "difference_std" in pyogrio.read_info(out, layer="anomalies")["fields"]
     said = capsys.readouterr().out
-    assert "10 % to 90 %" in said
+    assert "10 % and 90 % quantiles" in said
     assert "adhesion at 20 % slip" in said
     assert "headland" in said
     assert "driven once" in said

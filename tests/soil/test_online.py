@@ -194,8 +194,8 @@ def test_distance_forgets_up_to_what_is_known_of_any_ground():
     ("change", "expected"),
     [
         ({"dt": -0.1}, "back in time"),
-        ({"dt": np.nan}, "no number"),
-        ({"adhesion": np.inf}, "no number"),
+        ({"dt": np.nan}, "not a number"),
+        ({"adhesion": np.inf}, "not a number"),
         ({"slip": np.full(9, 0.2)}, "more than 8"),
         ({"slip_std": -0.1}, "negative spread"),
         ({"adhesion_constant_std": -0.1}, "negative spread"),
