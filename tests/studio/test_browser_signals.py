@@ -241,7 +241,7 @@ def test_any_quantity_over_any_other_of_what_the_charts_show(page: Any, served: 
     link = page.url
     page.goto("about:blank")
     page.goto(link)
-    page.wait_for_function("() => document.querySelector('#across-y').value.startsWith('measured')")
+    page.wait_for_function("() => document.querySelector('#across-y')?.value.startsWith('measured')")
     assert (page.input_value("#across-x"), page.input_value("#across-y")) == (
         "ground_speed",
         "measured:drawbar_force",
