@@ -141,20 +141,20 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
 static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
 
 /* What of the adhesions beyond the trends is no load (n,): of what lasts, a share, for a rut does that and a hill; and what slips tell.
- * Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was told already. */
+ * Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was explained already. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
-    const tg_real told = w->square > 0 ? k->bend * excess / w->square : 0;
+    const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0;
     tg_real lasting = 0, farthest = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
-    const tg_real slope = told * tgi_max(w->pulling, 0) * inverse / beyond_line(k, farthest, inverse); /* one for all: thrust stays */
+    const tg_real slope = explained * tgi_max(w->pulling, 0) * inverse / beyond_line(k, farthest, inverse); /* one for all: thrust stays */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;
     }
-    const tg_real hidden = (k->bend_spread - told) * inverse * tgi_sqrt(excess);
+    const tg_real hidden = (k->bend_spread - explained) * inverse * tgi_sqrt(excess);
     return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square(hidden / beyond_line(k, tgi_sqrt(excess), inverse));
 }
