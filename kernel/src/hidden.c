@@ -1,13 +1,10 @@
 /* What slips tell of loads that forces do not show (R; docs/decisions/0163). A wheel whose torque hardly answers to a bump takes it in
  * its slip: its force stays, and its adhesion changes with the load. Wheels share a curve, so that of a wheel's adhesion and slip, each
  * beyond its usual and the other wheels', mu - g' s is what the load does; g' is `bend` of the secant. In a row such slips are a fraction
- * of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches half a
- * radius apart holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond all trends is left; where there is,
- * warp.c counts what slips hide. */
+ * of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches of
+ * `slip_length`, their middles twice that apart, holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond
+ * all trends is left; where there is, warp.c counts what slips hide. */
 #include "estimator.h"
-
-#define TG_STRETCH ((tg_real)0.25) /* wheel radii over which a product's factors are means */
-#define TG_APART ((tg_real)0.5)    /* wheel radii between their middles, at least */
 
 /* Product of two deviations, each beyond the others', a driven wheel in the mean. */
 static tg_real product(const tg_estimator *e, const tg_real *a, const tg_real *b)
@@ -37,7 +34,7 @@ static void take_product(tg_estimator *e, const tgi_stretch *now, const tgi_stre
         there[i] = before->adhesion[i] - slope * before->slip[i];
     }
     const tg_real plain = product(e, now->adhesion, before->adhesion), beyond = product(e, here, there) - plain;
-    if (h->count < k->hill_memory / TG_STRETCH) h->count += 1;
+    if (h->count < k->hill_memory / k->slip_length) h->count += 1;
     h->plain += (alike * plain - h->plain) / h->count;
     h->beyond += (alike * beyond - h->beyond) / h->count;
     h->weight += (alike * alike - h->weight) / h->count;
@@ -62,9 +59,9 @@ static void end_stretch(tg_estimator *e)
         now->adhesion[i] /= now->length;
         now->slip[i] /= now->length;
     }
-    const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2;
-    const tgi_stretch *const before = near >= TG_APART ? last : older;
-    const tg_real away = near >= TG_APART ? near : far;
+    const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2, apart = 2 * e->settings.tuned.slip_length;
+    const tgi_stretch *const before = near >= apart ? last : older;
+    const tg_real away = near >= apart ? near : far;
     if (before->length > 0 && away < 2 * TG_LOAD_LENGTH && h->way > e->settings.tuned.uneven_length + far) take_product(e, now, before, away);
     *older = *last;
     *last = *now;
@@ -98,5 +95,5 @@ void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_re
     h->slipping += gain * (mean - h->slipping);
     h->way += travelled;
     h->now.length += travelled;
-    if (h->now.length >= TG_STRETCH) end_stretch(e);
+    if (h->now.length >= e->settings.tuned.slip_length) end_stretch(e);
 }
