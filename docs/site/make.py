@@ -66,7 +66,7 @@ CONTENTS: dict[str, list[str]] = {
         "licences",
     ],
     "Science": ["physics", "methods", "families", "warning", "real-logs", "benchmarks"],
-    "Inside": ["architecture", "kernel", "decisions/README"],
+    "Inside": ["architecture", "kernel", "mutants", "decisions/README"],
 }
 """The site's table of contents. A page of docs/ that stands nowhere here is put at the end of the how-tos."""
 
