@@ -1,10 +1,10 @@
 """Why the NIS of a channel of a measured log is not 1: what experiments on that log show, and the cause that they name.
 
-For each mean outside what is good: what the typical row has (median over that of chi-square, so that a few rows do not count), the share
+For each mean outside the good range: the typical row (median over that of chi-square, so that a few rows do not count), the share
 of the sum that a twentieth of the rows carries, the mean with this channel's noise halved and doubled, without accelerometer, without
 yaw rate, with a hundredth of the soil resistance's walk, with one fixed Q (method kalman), with the accelerometer's shocks counted once
-and remembered ten times as long, over the rows whose rims are steady, and over the others; how much successive innovations are alike,
-which white ones are not; and how far the wheels' adhesions walk together: the square of their sum's steps over the sum of their squares,
+and remembered ten times as long, over the rows whose rims are steady, and over the others; the correlation of successive innovations,
+0 if they are white; and how far the wheels' adhesions vary together: the square of their sum's steps over the sum of their squares,
 which the model takes to be 1.
 """
 
@@ -84,31 +84,31 @@ class Shown:
         for holds, words in (
             (
                 self.stale and self.mean < 1 and self.typical < 0.2 * self.mean,
-                "a torque or pose that is held counts as noise in every row since; the few fresh rows carry the rest",
+                "a held torque or pose counts as noise in every row since its sample; the few fresh rows carry the rest",
             ),
             (
                 self.near(self.calm_resistance),
-                "soil resistance is expected to walk, by the bank's scale in turns and starts even more; here it does not",
+                "the model lets soil resistance vary, by the bank's scale even more in turns and starts; here it does not",
             ),
             (
                 not self.stale and self.together < TOGETHER,
-                "sides go against each other: the wheels' adhesions walk apart, their sum does not",
+                "the sides work against each other: the wheels' adhesions diverge, their sum does not",
             ),
             (
                 self.near(self.no_acceleration),
                 "accelerometer and derived speed contradict each other: its window flattens starts and stops",
             ),
-            (self.near(self.no_yaw), "turns: the yaw rate is not what the sides do"),
-            (self.alike > ALIKE, f"{lasting}: successive innovations are alike"),
-            (self.mean > 1 and self.beyond(self.steady), "rims that change: starts, stops and turns of a new command carry it"),
+            (self.near(self.no_yaw), "turns: the yaw rate does not match the speeds of the sides"),
+            (self.alike > ALIKE, f"{lasting}: successive innovations are correlated"),
+            (self.mean > 1 and self.beyond(self.steady), "changing rim speeds: starts, stops and turns after a new command carry it"),
             (
                 self.mean < 1 and self.steady < self.mean and self.near(self.changing),
-                "a walk as wide as starts and stops need: steady rows are below 1, the others near it",
+                "process noise as large as starts and stops need: steady rows are below 1, the others near 1",
             ),
             (self.near(self.doubled), "noise understated"),
             (self.near(self.halved), "noise overstated: scatter and manoeuvre look alike"),
-            (self.near(self.calm_shocks), "shocks of starts and bumps count twice, and for seconds after"),
-            (self.beyond(self.fixed), "the bank's scale: it is that of the turns and starts around"),
+            (self.near(self.calm_shocks), "shocks at starts and bumps count twice, and for seconds afterwards"),
+            (self.beyond(self.fixed), "the bank's scale: it is that of the turns and starts nearby"),
             (self.carried > 0.5, "few rows carry it: shocks, stops and starts"),
         ):  # fmt: skip
             if holds:
@@ -240,9 +240,9 @@ def table(
     rows: list[tuple[str, str, Recording, Vehicle, Estimates, str]], cell: Callable[[float], str]
 ) -> str:
     """The rows (data, log, recording, vehicle, estimates, kind) as a table; ``cell`` writes a number."""
-    head = ("data", "log", "channel", "NIS", "typical row", "a twentieth carries", "noise halved", "doubled", "no accelerometer",
-            "no yaw rate", "calm resistance", "fixed Q", "calm shocks", "rims steady", "rims change", "alike",
-            "adhesions together", "cause")  # fmt: skip
+    head = ("data", "log", "channel", "NIS", "typical row", "largest twentieth", "noise halved", "doubled", "no accelerometer",
+            "no yaw rate", "calm resistance", "fixed Q", "calm shocks", "rims steady", "rims change", "correlation",
+            "sum of adhesions", "cause")  # fmt: skip
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for data, log, recording, vehicle, estimates, kind in rows:
         shown = experiments(recording, vehicle, estimates, kind)
