@@ -3,9 +3,10 @@
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
 The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, torque_signs.py, rolling.py,
-turn_rates.py, and torques.py's least thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the
-rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into
-every third of the drives (torques without a sign into all logs that have negative ones); one is found where its own note comes.
+turn_rates.py, forces.py, and torques.py's least thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in
+turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes
+are put into every third of the drives (torques without a sign into all logs that have negative ones); one is found where its own note
+comes.
 --write puts the table into docs/formats.md.
 """
 
@@ -42,6 +43,7 @@ LIMITS = {
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
     "torques": "_LEAST",
+    "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
     "rolling": "_PULLING _MOST",
@@ -159,6 +161,17 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
     yield "torque over 25", "drive torques over", changed(log, "drive_torque", by=lambda v: v / 25), vehicle
     mean = np.nanmean([log.channels[n] for n in torques], axis=0)
     yield "one torque for all", "are one signal", log.with_channels(**dict.fromkeys(torques, mean)), vehicle
+    if "acceleration_x" in log.channels:
+        yield (
+            "accelerometer in g",
+            "may be in g",
+            changed(log, "acceleration_x", by=lambda v: v / 9.80665),
+            vehicle,
+        )
+    if "drawbar_force" in log.channels:
+        balance = "In starts and stops"
+        yield "torques 1.5 times", balance, changed(log, "drive_torque", by=lambda v: 1.5 * v), vehicle
+        yield "mass 1.6 times", balance, log, with_mass(vehicle, 1.6)
     if vehicle.track:
         yield (
             "track doubled",
@@ -174,6 +187,14 @@ def with_radii(vehicle: Vehicle, factor: float) -> Vehicle:
     for part in (data, *data["axles"].values()):
         if part.get("wheel"):
             part["wheel"]["radius"] *= factor
+    return Vehicle.from_dict(data)
+
+
+def with_mass(vehicle: Vehicle, factor: float) -> Vehicle:
+    """The vehicle with its mass, and that of its axles, times a factor."""
+    data = vehicle.to_dict()
+    for part in (data, *data["axles"].values()):
+        part["mass"] *= factor
     return Vehicle.from_dict(data)
 
 

@@ -11,6 +11,7 @@ from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
 from terragrip.recording.dropouts import dropout_warnings
+from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
@@ -80,7 +81,8 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     sided, uneven = ([], []) if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
     thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
-    moved = motion_warnings(recording, vehicle, means, thrusts)
+    courses = Courses.of(recording, known)
+    moved = motion_warnings(recording, vehicle, means, thrusts) or acceleration_warnings(courses)
     unsigned = [] if known is None else sign_warnings(recording, known)
     copied = [] if known is None else copy_warnings(whole, known)
     speeds = [] if known is None or sided else _speed_warnings(recording, known)
@@ -97,7 +99,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *(unsigned or moved),
         *copied,
         *(
-            torque_warnings(recording, known, means, thrusts)
+            torque_warnings(recording, known, means, thrusts) or balance_warnings(courses, known)
             if known is not None and not (moved or unsigned)
             else ()
         ),

@@ -1,0 +1,184 @@
+"""Forces against accelerations where the speed changes, in starts and stops: sentences for the user, never errors.
+
+The wheels' thrust Σ M/r less the drawbar force is the mass times dv/dt + g sin(pitch), plus a resistance (physics.md 1), and an
+accelerometer along the vehicle reads the same acceleration. Within seconds the resistance changes by chance and the acceleration by
+command, which shows in the rims: their rate is the instrument of each regression, so neither noise nor a hit (which slows the vehicle,
+not the rims) bends it (R).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Floats
+from terragrip.recording.courses import points_of, smooth
+from terragrip.recording.ranks import quantile
+from terragrip.recording.rolling import driven_radii
+from terragrip.recording.turns import filled
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_CALM, _SLOW = 0.6, 12.0  # s: what changes faster is noise, and slower the ground
+_MOVING = 0.1  # of the speed that a twentieth of the drive exceeds
+_SLIP = 0.3  # beyond, resistance grows with the pull
+_LEAST = 20.0  # s of driving
+_BLOCKS = 12  # for the jackknife
+_SURE = 3.0  # standard errors
+_ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
+_ACCELERATION = 1.8  # an accelerometer's scale, and what a late ground speed makes of it
+_FORCE = 1.3  # an uncalibrated torque, an estimated mass
+
+
+@dataclass(frozen=True)
+class Range:
+    """A factor with its bounds, `_SURE` standard errors away."""
+
+    value: float
+    low: float
+    high: float
+
+    def is_off(self, factor: float) -> bool:
+        """Whether it is surely beyond ``factor`` or its inverse, or of the other sign."""
+        return self.low > factor or self.high < 1 / factor
+
+    @property
+    def holds_one(self) -> bool:
+        return self.low <= 1.0 <= self.high
+
+
+_RIGHT = Range(1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Courses:
+    """Courses (n,) of a drive without what changes slowly: ``rims``: their rate; ``change``: that of the ground speed, with the climb; the
+    accelerometer's ``shown``; ``thrust`` and ``pull`` over the mass [m/s²], None where the log lacks them."""
+
+    rims: Floats
+    change: Floats
+    shown: Floats | None
+    thrust: Floats | None
+    pull: Floats | None
+
+    @classmethod
+    def of(cls, recording: Recording, vehicle: Vehicle | None) -> Courses | None:
+        """None without speeds of ground and wheels, where rows are too far apart to show a start, or too little is driven."""
+        time, channels = recording.time, recording.channels
+        found = points_of(time)
+        names = (
+            [n for n in channels if n.startswith("wheel_speed_")]
+            if vehicle is None
+            else [f"wheel_speed_{w}" for w in driven_radii(vehicle)]
+        )
+        if found is None or not names or not _known(recording, "ground_speed", *names):
+            return None
+        points, step = found
+        if 2 * step > _CALM:
+            return None
+
+        def at(name: str) -> Floats:
+            return np.interp(points, time, filled(time, channels[name]))
+
+        def calm(values: Floats) -> Floats:
+            return smooth(values, _CALM, step)
+
+        radii = {} if vehicle is None else driven_radii(vehicle)
+        rim = calm(np.mean([radii.get(n[12:], 1.0) * at(n) for n in names], axis=0))
+        speed = calm(at("ground_speed"))
+        rows = speed > _MOVING * quantile(speed, 0.95)
+        rows &= rim > (_MOVING * quantile(rim, 0.95) if vehicle is None else speed * 0.0)
+        if vehicle is not None:
+            rows &= rim - speed < _SLIP * rim
+        if rows.sum() * step < _LEAST:
+            return None
+
+        share = smooth(rows.astype(np.float64), _SLOW, step)
+
+        def quick(values: Floats) -> Floats:
+            """Less the mean while driving: at rest nothing resists."""
+            return (values - smooth(np.where(rows, values, 0.0), _SLOW, step) / np.maximum(share, 1e-9))[rows]
+
+        rate = np.gradient(rim, step)
+        change = np.gradient(speed, step)
+        if _known(recording, "pitch"):
+            change = change + STANDARD_GRAVITY * np.sin(calm(at("pitch")))
+        shown = quick(calm(at("acceleration_x"))) if _known(recording, "acceleration_x") else None
+        thrust = pull = None
+        torques = [f"drive_torque_{w}" for w in radii]
+        if vehicle is not None and _known(recording, "drawbar_force", *torques):
+            spun = sum(
+                float(inertia) / radius**2 * on
+                for inertia, radius, on in zip(
+                    vehicle.wheel_inertia, vehicle.wheel_radius, vehicle.driven, strict=True
+                )
+            )
+            force = calm(np.sum([at(f"drive_torque_{w}") / r for w, r in radii.items()], axis=0))
+            thrust = quick((force - spun * rate) / vehicle.mass)
+            pull = quick(calm(at("drawbar_force")) / vehicle.mass)
+        return cls(quick(rate), quick(change), shown, thrust, pull)
+
+    def slopes(self, y: Floats, *beside: Floats) -> list[Range] | None:
+        """y (n,) over the change of speed, and over each of ``beside``; None where the rims tell nothing of that change."""
+        if not float(np.corrcoef(self.rims, self.change)[0, 1]) > _ALIKE:
+            return None
+        one = np.ones(len(y))
+        inside, outside = [self.rims, *beside, one], [self.change, *beside, one, y]
+        block = np.arange(len(y)) * _BLOCKS // len(y)
+        sums = np.array(
+            [
+                np.stack([v[block == k] for v in inside]) @ np.stack([v[block == k] for v in outside]).T
+                for k in range(_BLOCKS)
+            ]
+        )
+        whole = sums.sum(axis=0)
+        tables = np.concatenate([whole[None], whole - sums])
+        if not (np.linalg.matrix_rank(tables[..., :-1]) == len(inside)).all():
+            return None
+        fits = np.linalg.solve(tables[..., :-1], tables[..., -1:])[..., 0]
+        errors = _SURE * np.sqrt((_BLOCKS - 1) * np.var(fits[1:], axis=0))
+        return [Range(v, v - e, v + e) for v, e in zip(fits[0], errors, strict=True)][: 1 + len(beside)]
+
+
+def acceleration_warnings(courses: Courses | None) -> list[str]:
+    """A sentence on an accelerometer of another sign or scale than the change of speed."""
+    found = courses.slopes(courses.shown) if courses is not None and courses.shown is not None else None
+    if not found or not found[0].is_off(_ACCELERATION):
+        return []
+    flat = "acceleration_x is not the change of ground speed"
+    if found[0].value < 0:
+        return [f"{flat} but its opposite: forward is positive: write 'sign: -1' for it in the profile."]
+    return [
+        f"{flat} but {found[0].value:.2g} times that: it may be in g (write 'unit: g' in the profile), or not the axis that points forward."
+    ]
+
+
+def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
+    """A sentence on torques, drawbar force and mass that do not go together, and which of them is off by what goes with each."""
+    if courses is None or courses.thrust is None or courses.pull is None:
+        return []
+    mass, pull = courses.slopes(courses.thrust, courses.pull) or (_RIGHT, _RIGHT)
+    if not (mass.is_off(_FORCE) or pull.is_off(_FORCE)):
+        return []
+    causes = []
+    if max(mass.low, pull.low) <= min(mass.high, pull.high):
+        causes.append(
+            "the torques' scale (at the wheel, not at the motor: the gear ratio counts) and the wheel radius"
+        )
+    if pull.holds_one:
+        causes.append("the mass")
+    if mass.holds_one:
+        causes.append("the scale of drawbar_force")
+    return [
+        f"In starts and stops the drive torques over the wheel radius change by {mass.value:.2g} times the force that moves "
+        f"{vehicle.mass:.4g} kg, and by {pull.value:.2g} times the drawbar force: check {', or '.join(causes) or 'the units of all three'}."
+    ]
+
+
+def _known(recording: Recording, *names: str) -> bool:
+    return all(np.isfinite(recording.channels.get(name, np.nan)).sum() > 1 for name in names)

@@ -1,0 +1,133 @@
+"""Starts and stops show which of mass, torques, drawbar force and accelerometer does not go with the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.forces import Range
+from terragrip.vehicle import Vehicle
+
+G, MASS, RADIUS, INERTIA = 9.80665, 600.0, 0.4, 3.0
+Columns = dict[str, np.ndarray]
+
+
+def machine(mass: float = MASS) -> Vehicle:
+    axles = {
+        "front": {"mass": 0.45 * mass, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 0.55 * mass, "wheels": ["rl", "rr"]},
+    }
+    return Vehicle.from_dict(
+        {
+            "mass": mass,
+            "wheelbase": 1.2,
+            "track": 1.0,
+            "center_of_gravity_height": 0.4,
+            "hitch_height": 0.3,
+            "axles": axles,
+            "wheel": {"radius": RADIUS, "inertia": INERTIA},
+        }
+    )
+
+
+def drive(seed: int = 0) -> Columns:
+    """Two minutes at 20 Hz by Newton's second law: steps between three speeds and stops, a drag behind, ground that resists more here
+    than there. Between its starts and stops nothing is calmer: rims and drag are steady."""
+    draws = np.random.default_rng(seed)
+    time = np.arange(0, 120, 0.05)
+    levels = np.repeat([0.0, 1.0, 1.6, 0.0, 1.3, 0.7, 1.5, 0.0, 1.6, 1.0, 1.4, 0.0], 10)
+    rim = np.interp(time, np.arange(120) + 0.5, levels)
+    moving = rim > 0.02
+    rough = np.interp(time, np.arange(0, 121, 4.0), draws.standard_normal(31))
+    pull = (
+        moving * MASS * G * (0.15 + 0.05 * np.interp(time, np.arange(0, 121, 3.0), draws.standard_normal(41)))
+    )
+    speed = rim * (1 - 0.04 - 0.005 * rough)
+    change = np.gradient(speed, time)
+    thrust = MASS * change + pull + moving * MASS * G * (0.06 + 0.01 * rough)
+
+    def noisy(values: np.ndarray, size: float) -> np.ndarray:
+        return values + size * draws.standard_normal(len(time))
+
+    result = {
+        "time": time,
+        "ground_speed": noisy(speed, 0.02),
+        "acceleration_x": noisy(change, 0.1),
+        "drawbar_force": noisy(pull, 20.0),
+    }
+    for wheel in ("fl", "fr", "rl", "rr"):
+        result[f"wheel_speed_{wheel}"] = noisy(rim / RADIUS, 0.02)
+        spun = INERTIA * np.gradient(rim, time) / RADIUS
+        result[f"drive_torque_{wheel}"] = noisy(RADIUS * thrust / 4 + spun, 5.0)
+    return result
+
+
+def notes(columns: Columns, vehicle: Vehicle | None) -> list[str]:
+    return unit_warnings(Recording.from_frame(columns), vehicle)
+
+
+def times(columns: Columns, name: str, factor: float) -> Columns:
+    return {n: v * factor if n.startswith(name) else v for n, v in columns.items()}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_right_drive_and_usual_errors_are_left_alone(seed: int) -> None:
+    columns = drive(seed)
+    assert notes(columns, machine()) == []
+    assert notes(times(columns, "drive_torque", 1.1), machine(0.9 * MASS)) == []
+    assert notes(columns, None) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("name", "factor", "cause"),
+    [
+        ("mass", 1.6, "check the mass."),
+        ("mass", 1 / 1.6, "check the mass."),
+        ("drive_torque", 1.5, "check the torques' scale"),
+        ("drive_torque", 1 / 1.5, "check the torques' scale"),
+        ("drawbar_force", 1.6, "drawbar"),
+        ("drawbar_force", 1 / 1.6, "check the scale of drawbar_force."),
+    ],
+)
+def test_which_of_three_is_off_is_named(name: str, factor: float, cause: str, seed: int) -> None:
+    columns = drive(seed)
+    vehicle = machine(factor * MASS) if name == "mass" else machine()
+    (note,) = notes(columns if name == "mass" else times(columns, name, factor), vehicle)
+    assert cause in note
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(("factor", "cause"), [(-1.0, "its opposite"), (1 / G, "it may be in g")])
+def test_an_accelerometer_needs_no_torque_to_be_wrong(factor: float, cause: str, known: bool) -> None:
+    """And no lively drive: its noise is a fifth of what a start shows."""
+    columns = {n: v for n, v in drive().items() if not n.startswith(("drive_torque", "drawbar"))}
+    assert notes(columns, machine() if known else None) == []
+    (note,) = notes(times(columns, "acceleration_x", factor), machine() if known else None)
+    assert cause in note
+
+
+def test_what_slows_the_vehicle_and_not_the_rims_says_nothing_of_the_mass() -> None:
+    """Hits: the speed falls while the thrust rises, which a plain regression takes for a mass below 0."""
+    columns = drive()
+    time = columns["time"]
+    hit = np.sum([np.exp(-(((time - at) / 0.5) ** 2)) for at in range(12, 120, 9)], axis=0)
+    moving = columns["ground_speed"] > 0.4
+    columns["ground_speed"] = columns["ground_speed"] * (1 - 0.2 * hit)
+    columns["acceleration_x"] = columns["acceleration_x"] + np.gradient(
+        -0.2 * hit * columns["ground_speed"], time
+    )
+    for wheel in ("fl", "fr", "rl", "rr"):
+        columns[f"drive_torque_{wheel}"] = (
+            columns[f"drive_torque_{wheel}"] + moving * hit * 0.1 * RADIUS * MASS * G / 4
+        )
+    assert notes(columns, machine()) == []
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "off"),
+    [(0.9, 1.1, False), (1.4, 1.6, True), (1.2, 2.0, False), (0.5, 0.7, True), (-2.0, -1.0, True)],
+)
+def test_a_factor_is_off_where_all_of_its_interval_is(low: float, high: float, off: bool) -> None:
+    assert Range((low + high) / 2, low, high).is_off(1.3) is off
