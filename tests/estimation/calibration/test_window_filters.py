@@ -239,25 +239,55 @@ def test_evidence_is_an_entry_a_log_with_its_span_and_samples() -> None:
     assert evidence(windows, stops[:1], ["a", "b"], np.full(40, 3.0))[0].samples == 6
 
 
+def readings(*means: float, columns: tuple[float, ...] = (1.0,)) -> tuple[Windows, np.ndarray, list[Spell]]:
+    """Stops of two seconds with a second of driving after each, and what each reads, times each of ``columns``."""
+    stops = [Spell(6 * k, 6 * k + 3) for k in range(len(means))]
+    windows = stopped(*((spell.first, spell.last + 1) for spell in stops))
+    values = np.full(40, 30.0)
+    for spell, mean in zip(stops, means, strict=True):
+        values[spell.rows] = mean
+    return windows, values[:, None] * columns, stops
+
+
+MOST = np.array([9.0])
+
+
 @pytest.mark.parametrize(("apart", "alike"), [(0.29, True), (0.31, False)])
 def test_stops_are_alike_within_three_errors_of_noise(apart: float, alike: bool) -> None:
     """Of 200 samples with noise of 1 the error of a stop is .0707, and that of a difference .1."""
-    both = [Spell(0, 3), Spell(4, 7)]
-    values = np.repeat([0.0, apart], 4)[:, None]
-    assert resting(values, both, np.full(8, 50.0), 1.0) == (both if alike else both[:1])
+    windows, values, both = readings(0.0, apart)
+    assert resting(windows, values, both, np.full(40, 50.0), 1.0, MOST) == (both if alike else [])
+    near = resting(windows, values, both, np.full(40, 50.0), 1.0, MOST, usual=0.1)
+    assert near == (both if alike else both[:1])
 
 
 def test_of_stops_the_most_that_agree_count_and_of_as_many_those_nearest_to_zero() -> None:
-    count, four = np.full(20, 100.0), [Spell(4 * k, 4 * k + 3) for k in range(5)]
-    values = np.repeat([2.0, 2.0, 2.0, -1.0, 5.0], 4)[:, None]
-    assert resting(values, four, count, 1.0) == four[:3]
-    values = np.repeat([2.0, 2.0, -1.0, -1.0, 5.0], 4)[:, None]
-    assert resting(values, four, count, 1.0) == four[2:4]
-    assert resting(values, four, count, 0.0) == four
-    unread = np.where(np.arange(20)[:, None] >= 16, np.nan, values)
-    assert resting(unread, four, count, 0.0) == four[:4]
-    both = np.column_stack([values[:, 0], np.repeat([0.0, 3.0, 0.0, 0.0, 0.0], 4)])
-    assert resting(both, four[:2], count, 1.0) == four[:1]
+    count = np.full(40, 100.0)
+    windows, values, five = readings(2.0, 2.0, 2.0, -1.0, 5.0)
+    assert resting(windows, values, five, count, 1.0, MOST) == five[:3]
+    windows, values, five = readings(2.0, 2.0, -1.0, -1.0, 5.0)
+    assert resting(windows, values, five, count, 1.0, MOST) == five[2:4]
+    assert resting(windows, values, five, count, 0.0, MOST) == five
+    assert resting(windows, values, five, count, 0.0, MOST / 2) == five[:4]
+    unread = np.where(np.arange(40)[:, None] >= 24, np.nan, values)
+    assert resting(windows, unread, five, count, 0.0, MOST) == five[:4]
+
+
+def test_where_one_wheel_holds_the_vehicle_no_wheel_reads_its_zero() -> None:
+    windows, values, stops = readings(0.2, 0.2, 0.2, columns=(1.0, 50.0))
+    assert resting(windows, values, stops, np.full(40, 100.0), 1.0, np.array([1.0, 9.0])) == []
+    assert resting(windows, values, stops, np.full(40, 100.0), 1.0, np.array([1.0, 11.0])) == stops
+
+
+def test_one_stop_counts_where_it_lasts_and_stops_without_driving_between_are_one() -> None:
+    values, count = np.full((40, 1), 0.2), np.full(40, 100.0)
+    long, short = [Spell(0, 7)], [Spell(0, 6)]
+    windows = stopped((0, 20))
+    assert resting(windows, values, long, count, 1.0, MOST) == long
+    assert resting(windows, values, short, count, 1.0, MOST) == []
+    assert resting(windows, values, [Spell(0, 2), Spell(5, 8)], count, 1.0, MOST) == []
+    two_logs = replace(windows, recording=np.repeat([0, 1], [4, 36]))
+    assert len(resting(two_logs, values, [Spell(0, 2), Spell(5, 8)], count, 1.0, MOST)) == 2
 
 
 @pytest.mark.parametrize(("known", "told"), [(1, False), (2, True)])

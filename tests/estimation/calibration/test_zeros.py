@@ -104,6 +104,24 @@ def test_drawbar_zero_and_a_taut_bar(drive: Make, vehicle: Vehicle) -> None:
     assert any("under tension" in u.why for u in taut.unknown)
 
 
+def test_a_bar_left_under_tension_at_a_short_stop_is_no_zero(drive: Make, vehicle: Vehicle) -> None:
+    """2 N of tension are less than the file's 3 N, and a stop of 3 s shows no difference; 10 s are stood for the zeros."""
+    short = calibrate(drive(60, standing=3, bar_tension=2.0, noise=0.1), vehicle)
+    assert "drawbar_offset" not in short
+    assert any("stand 10 s with the motors off" in u.why for u in short.unknown)
+    twice = [drive(60, standing=3, drawbar_offset=-2.0, noise=0.1, seed=k) for k in range(2)]
+    assert calibrate(twice, vehicle)["drawbar_offset"].value == pytest.approx(-2.0, abs=0.2)
+
+
+def test_three_wheels_that_hold_the_vehicle_say_that_the_fourth_does_too(
+    drive: Make, vehicle: Vehicle
+) -> None:
+    log = drive(60, standing=10, held_torque=6.0)  # driving takes some 40 N m: a twentieth is 2
+    first = np.where(log["ground_speed"] < 0.01, 1.5, log["drive_torque_fl"])
+    result = calibrate(log.with_channels(drive_torque_fl=first), vehicle)
+    assert "drive_torque_offset fl" not in result
+
+
 def test_drawbar_zero_from_driving_without_a_tool(drive: Make, vehicle: Vehicle) -> None:
     log = drive(60, noise=1.0)
     free = 2.5 + 4 * np.random.default_rng(5).standard_normal(len(log))

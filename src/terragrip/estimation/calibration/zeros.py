@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,6 +32,8 @@ _UNKNOWN_BIAS = (
 )
 _UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle never stands: .3 deg/s
 _ALIKE = 3.0  # standard errors
+_ALONE = 4.0  # s that one stop must last to count without another that agrees: whoever stands for the zeros stands 10 s
+_ONE_SHORT_STOP = "one short stop, or stops that disagree: stand 10 s with the motors off and the bar slack, or twice with driving between"
 _IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
 
 
@@ -110,23 +113,61 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
     return float(np.mean(means)), error
 
 
-def resting(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> list[Spell]:
-    """The spells that read alike in all of ``values`` (n, k), within noise: the most numerous such group.
+def resting(
+    windows: Windows,
+    values: Floats,
+    stops: Sequence[Spell],
+    count: Floats,
+    noise: float,
+    most: Floats,
+    usual: Floats | float = -1.0,
+) -> list[Spell]:
+    """The stops at which every column of ``values`` (n, k) reads its zero, as far as that can be known; ``noise`` is that of a
+    sample, of which a window has ``count`` (n,).
 
-    A zero is the same at every stop; a torque that holds the vehicle, or a tension in the bar, is not. Of groups of one size
-    the one nearest to zero is taken.
+    A zero is small (``most`` (k,)) and the same at every stop; a torque that holds the vehicle, or a tension in the bar, is
+    not, and where one wheel holds it, its zero is not the others' either. So those that read alike within noise count: the
+    most numerous such group, of groups of one size the one nearest to zero. Stops without driving between them are one stop,
+    and one counts only if it lasts as long as one made for this, or reads no more than ``usual`` (k,) in any column.
     """
-    stops = [spell for spell in stops if np.isfinite(values[spell.rows]).any(axis=0).all()]
-    if len(stops) < 2 or noise <= 0:
-        return stops
-    means = np.array([np.nanmean(values[spell.rows], axis=0) for spell in stops])
+    stops = [spell for spell in stops if np.all(np.abs(stop_means(values, spell)) <= most)]
+    if not stops:
+        return []
+    means = np.array([stop_means(values, spell) for spell in stops])
     errors = noise / np.sqrt([max(1.0, count[spell.rows].sum()) for spell in stops])
-    apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
-    alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
-    rank = [(int(alike[k].sum()), -float(np.max(np.abs(means[k])))) for k in range(len(stops))]
-    group = alike[max(range(len(stops)), key=lambda k: rank[k])]
-    near = np.max(np.abs(means - np.median(means[group], axis=0)), axis=1) < _ALIKE * errors
-    return [spell for spell, member in zip(stops, near, strict=True) if member]
+    alike = np.ones((len(stops), len(stops)), dtype=bool)
+    if noise > 0:
+        apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
+        alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
+    groups = []
+    for of_one, mean in zip(alike, means, strict=True):
+        away = np.max(np.abs(means - np.median(means[of_one], axis=0)), axis=1)
+        members = [
+            spell
+            for spell, error, d in zip(stops, errors, away, strict=True)
+            if noise <= 0 or d < _ALIKE * error
+        ]
+        if _sure(windows, members) or np.all(np.abs(mean) <= usual):
+            groups.append((int(of_one.sum()), -float(np.max(np.abs(mean))), members))
+    return max(groups, key=lambda group: group[:2])[2] if groups else []
+
+
+def stop_means(values: Floats, spell: Spell) -> Floats:
+    """Mean (k,) of values (n, k) over a stop; NaN where a column has no value in it."""
+    rows = values[spell.rows]
+    known = np.isfinite(rows)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, rows, 0.0).sum(axis=0) / known.sum(axis=0)
+
+
+def _sure(windows: Windows, stops: Sequence[Spell]) -> bool:
+    """Whether stops are more than one, with driving between them, or last long enough."""
+    moving = np.abs(windows.ground_speed) > _DRIVING
+    apart = (
+        windows.recording[a.last] != windows.recording[b.first] or moving[a.last : b.first].any()
+        for a, b in pairwise(stops)
+    )
+    return sum(spell.last - spell.first + 1 for spell in stops) * windows.length >= _ALONE or any(apart)
 
 
 def torque_zeros(
@@ -136,25 +177,40 @@ def torque_zeros(
     key, stops = "drive_torque_offset", standstills(windows, vehicle)
     if not stops:
         return [], [Unknown(key, f"no standstill of {_LEAST_STANDING:.0f} s or longer")]
-    quantities, unknown = [], []
     driven = np.flatnonzero(vehicle.driven)
-    stops = resting(windows.torque[:, driven], stops, windows.torque_count, noise)
+    torque, wheels = windows.torque[:, driven], [vehicle.wheels[index] for index in driven]
+    stops = [spell for spell in stops if np.isfinite(stop_means(torque, spell)).all()]
     if not stops:
         return [], [Unknown(key, "no torque was measured at standstill")]
-    for index in driven:
-        wheel, torque = vehicle.wheels[index], windows.torque[:, index]
-        value, error = spell_mean(torque, stops, windows.torque_count, noise)
-        driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
-        work = float(np.nanquantile(driving, 0.95)) if np.isfinite(driving).any() else np.inf
-        allowed = max(3 * (vehicle.uncertainty.drive_torque_offset or 0.0), _IDLE_SHARE * work)
-        if abs(value) > allowed:
-            why = f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle"
-            unknown.append(Unknown(f"{key} {wheel}", why))
-        else:
-            sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
-            entry = evidence(windows, stops, sources, windows.torque_count)
-            quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
-    return quantities, unknown
+    stated = 3 * (vehicle.uncertainty.drive_torque_offset or 0.0)
+    allowed = np.maximum(stated, _IDLE_SHARE * _work(windows, torque))
+    calm = resting(windows, torque, stops, windows.torque_count, noise, allowed, stated)
+    if not calm:
+        least = min(
+            (stop_means(torque, spell) for spell in stops), key=lambda mean: np.max(np.abs(mean) - allowed)
+        )
+        holding = [
+            Unknown(
+                f"{key} {wheel}",
+                f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle",
+            )
+            for wheel, value, most in zip(wheels, least, allowed, strict=True)
+            if abs(value) > most
+        ]
+        return [], holding or [Unknown(key, _ONE_SHORT_STOP)]
+    quantities = []
+    for wheel, values in zip(wheels, torque.T, strict=True):
+        value, error = spell_mean(values, calm, windows.torque_count, noise)
+        sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
+        entry = evidence(windows, calm, sources, windows.torque_count)
+        quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
+    return quantities, []
+
+
+def _work(windows: Windows, torque: Floats) -> Floats:
+    """The torques (k,) of driving, of which torque (n, k) exceeds a twentieth; infinite where no driving was measured."""
+    driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
+    return np.array([np.nanquantile(v, 0.95) if np.isfinite(v).any() else np.inf for v in driving.T])
 
 
 def drawbar_zero(
@@ -171,18 +227,21 @@ def drawbar_zero(
     stops = standstills(windows, vehicle)
     sentence = "mean of the stops that agree; assumes that the bar is slack there"
     why = f"no standstill of {_LEAST_STANDING:.0f} s or longer, and none free of a tool"
-    stops = resting(windows.drawbar[:, None], stops, windows.drawbar_count, noise)
-    if stops:
-        value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
-        why = f"at standstill it reads {value:.1f} N, so the bar seems to be under tension"
-    if not stops or not abs(value) <= allowed:
+    bar = windows.drawbar[:, None]
+    readings = [float(mean) for spell in stops for mean in stop_means(bar, spell) if np.isfinite(mean)]
+    if readings:
+        least = min(readings, key=abs)
+        taut = f"at standstill it reads {least:.1f} N, so the bar seems to be under tension"
+        why = taut if abs(least) > allowed else _ONE_SHORT_STOP
+    stops = resting(windows, bar, stops, windows.drawbar_count, noise, np.array([allowed]))
+    if not stops:
         stops = _free_passes(windows, noise)
         sentence = "mean over driving with a constant drawbar force; assumes that nothing is towed there"
         if not stops:
             return [], [Unknown(key, why)]
-        value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
-        if not abs(value) <= allowed:
-            return [], [Unknown(key, why)]
+    value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
+    if not abs(value) <= allowed:
+        return [], [Unknown(key, why)]
     return [
         Quantity(key, value, error, "N", evidence(windows, stops, sources, windows.drawbar_count), sentence)
     ], []
