@@ -8,6 +8,7 @@ import os
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,7 +24,7 @@ from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import KernelMachine
 from terragrip.ground.classification.learnt import Learnt
 from terragrip.ground.classification.motion_law import MotionLaw
-from terragrip.ground.classification.novelty import LEVELS, SPANS, Strangeness
+from terragrip.ground.classification.novelty import Strangeness
 from terragrip.ground.classification.roles import roles_of
 from terragrip.ground.classification.standardization import Standardization
 
@@ -33,25 +34,14 @@ FORMAT = "terragrip ground classifier"
 VERSION = 3
 
 
-# Arrays of an expert's parts, with their shapes in terms of the machine's features, support vectors, pairs, classes,
-# discriminants, known windows, kinds of oddness, spans, levels; all features, trees, nodes; the law's features, effects, terms.
-_PARTS = {
-    "standardization": {"centre": "f", "scale": "f", "weight": "f"},
-    "machine": {"support": "vf", "weights": "vp", "offsets": "p"},
-    "discriminants": {"axes": "fd", "points": "wd"},
-    "strangeness": {"usual": "32", "levels": "Sl"},
-    "forest": {
-        "centre": "F",
-        "roots": "t",
-        "feature": "n",
-        "threshold": "n",
-        "left": "n",
-        "right": "n",
-        "share": "nk",
-    },
-    "law": {"centre": "b", "scale": "b", "whitening": "ee", "laws": "kre"},
+_PARTS: dict[str, Any] = {
+    "standardization": Standardization,
+    "machine": KernelMachine,
+    "discriminants": Discriminants,
+    "strangeness": Strangeness,
+    "forest": Forest,
+    "law": MotionLaw,
 }
-_WHOLE = ("roots", "feature", "left", "right")
 _PREFIXED = ("forest", "law")  # their arrays' names in the file begin with the part's
 _OFFSETS = "class_offsets"
 
@@ -130,24 +120,18 @@ def load(path: str | os.PathLike[str], make: Callable[[Mapping[str, Any], Learnt
 
 def _arrays(expert: Expert) -> dict[str, Any]:
     """The arrays of an expert by their names in the file."""
-    parts = expert.parts
-    held = {
-        "standardization": parts.standardization,
-        "machine": parts.machine,
-        "discriminants": parts.discriminants,
-        "strangeness": expert.strangeness,
-        "forest": parts.forest,
-        "law": parts.law,
-    }
+    held = {**vars(expert.parts), "strangeness": expert.strangeness}
     there = {name: part for name, part in held.items() if part is not None}
-    result = {
-        _key(name, field): getattr(part, field) for name, part in there.items() for field in _PARTS[name]
-    }
+    result = {key: getattr(part, field) for name, part in there.items() for field, key in _keys(name).items()}
     return {_OFFSETS: expert.offsets, **result}
 
 
-def _key(part: str, field: str) -> str:
-    return f"{part}_{field}" if part in _PREFIXED else field
+def _keys(part: str) -> dict[str, str]:
+    """The names in the file of a part's arrays, by those of its fields."""
+    begin = f"{part}_" if part in _PREFIXED else ""
+    return {
+        one.name: f"{begin}{one.name}" for one in fields(_PARTS[part]) if one.type not in ("float", "int")
+    }
 
 
 def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
@@ -188,68 +172,39 @@ def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
 def _expert(
     header: dict[str, Any], features: tuple[str, ...], classes: int, archive: Any, number: int
 ) -> Expert:
+    """An expert of the file; a window without any value shows whether its arrays fit each other."""
     roles = roles_of(features)
-    machine, motion, effects = len(roles.machine), len(roles.motion), len(roles.effects)
-    sizes = {
-        "f": machine,
-        "p": classes * (classes - 1) // 2,
-        "k": classes,
-        "d": min(classes - 1, machine),
-        "3": 3,
-        "2": 2,
-        "S": len(SPANS),
-        "l": len(LEVELS),
-        "F": len(features),
-        "b": motion + effects,
-        "e": effects,
-        "r": 1 + 2 * motion,
-    }
 
-    def part(name: str) -> dict[str, Any]:
-        arrays = {field: archive[f"{_key(name, field)}_{number}"] for field in _PARTS[name]}
-        _check_shapes(arrays, _PARTS[name], sizes)
-        return arrays
+    def array(key: str) -> Any:
+        result = archive[f"{key}_{number}"]
+        if not result.size or np.isnan(result).any():
+            raise ValueError(f"{key} is empty, or holds NaN")
+        return result
+
+    def part(name: str, **numbers: Any) -> Any:
+        return _PARTS[name](**{field: array(key) for field, key in _keys(name).items()}, **numbers)
 
     slopes = np.array(header["slopes"], dtype=float)
     if slopes.shape != (1 + roles.forest + roles.law,) or not (slopes > 0).all():
         raise ValueError("the slopes are not one for each part")
-    forest = Forest(**part("forest")) if roles.forest else None
-    if forest is not None:
-        forest.check()
     parts = Parts(
-        Standardization(**part("standardization")),
-        KernelMachine(**part("machine"), width=float(header["width"]), classes=classes),
-        Discriminants(**part("discriminants")),
-        forest,
-        MotionLaw(**part("law")) if roles.law else None,
+        part("standardization"),
+        part("machine", width=float(header["width"]), classes=classes),
+        part("discriminants"),
+        part("forest") if roles.forest else None,
+        part("law") if roles.law else None,
     )
-    offsets = {_OFFSETS: archive[f"{_OFFSETS}_{number}"]}
-    _check_shapes(offsets, {_OFFSETS: "k"}, sizes)
-    strangeness = Strangeness(**part("strangeness"))
-    return Expert(frozenset(header["families"]), features, parts, slopes, offsets[_OFFSETS], strangeness)
-
-
-def _check_shapes(arrays: dict[str, Any], shapes: dict[str, str], sizes: dict[str, int]) -> None:
-    """Raise ValueError on an array that is empty, holds NaN, or has another shape or type.
-
-    A size that ``sizes`` does not give is free, but one in all of these arrays.
-    """
-    free: dict[str, int] = {}
-    for name, letters in shapes.items():
-        array = arrays[name]
-        kind = "i" if name in _WHOLE else "f"
-        if array.ndim != len(letters) or array.dtype.kind != kind:
-            raise ValueError(f"{name} has shape {array.shape}")
-        wanted = [
-            sizes[x] if x in sizes else free.setdefault(x, n)
-            for x, n in zip(letters, array.shape, strict=True)
-        ]
-        if list(array.shape) != wanted:
-            raise ValueError(f"{name} has shape {array.shape}")
-        if not array.size:
-            raise ValueError(f"{name} is empty")
-        if np.isnan(array).any():
-            raise ValueError(f"{name} holds NaN")
+    if parts.forest is not None:
+        parts.forest.check()
+    strangeness, families = part("strangeness"), frozenset(header["families"])
+    expert = Expert(families, features, parts, slopes, array(_OFFSETS), strangeness)
+    chances, strange = expert.judge(np.full((1, len(features)), np.nan))
+    if (
+        chances.shape != (1, classes)
+        or not np.isfinite([*chances[0], *strangeness.novelty(strange, 1.0)]).all()
+    ):
+        raise ValueError("an expert's arrays do not fit each other")
+    return expert
 
 
 def _plain(value: Any) -> Any:
