@@ -21,7 +21,8 @@ from terragrip.formats.table import Wanted, skips
 
 LONGEST_ARRAY = 16
 """Numbers of a list beyond which none is a signal."""
-_LONGEST_LIST = 8  # messages in a message
+LONGEST_LIST = 8
+"""Messages of a list beyond which none is one."""
 _DEEPEST = 8
 BLOCK = 1000
 """Messages that are read or left out together, where a log is looked at in parts."""
@@ -51,12 +52,13 @@ class Topic:
 
     ``parts`` gives the fields of a message; ``stamp`` the sender's time [s], if the message has one; ``field_of`` one field by
     name, where there is a short way to it: it raises LookupError, TypeError or AttributeError where the field is not there.
+    These three are for messages that come as objects; those of ROS come as bytes (`terragrip.formats.ros_topic`).
     ``strange``: values that are not there, or of another kind than in the first message.
     """
 
     name: str
-    parts: Parts
-    stamp: Callable[[Any], float | None]
+    parts: Parts = lambda message: ()
+    stamp: Callable[[Any], float | None] = lambda message: None
     wanted: Wanted | None = None
     field_of: Callable[[Any, str], Any] | None = None
     names: tuple[str, ...] = ()
@@ -114,16 +116,6 @@ class Topic:
             return [fields.get(path) for path in paths]
         return [_at(message, path, self.field_of) for path in paths]
 
-    def fields(self, message: Any) -> dict[str, Any]:
-        """The wanted fields of one message by name, for who takes messages as they come; nothing is collected."""
-        self._labels = names_of_entries(dict(self.parts(message)))
-        fields: dict[Path, Any] = {}
-        self._walk(message, (), fields, None)
-        names = {
-            f"{self.name}.{_shown(path)}" if path else self.name: value for path, value in fields.items()
-        }
-        return {name: value for name, value in names.items() if self.wanted is None or self.wanted(name)}
-
     def signals(self) -> tuple[dict[str, Signal], list[str]]:
         """The signals collected, and sentences on them."""
         notes = []
@@ -178,14 +170,21 @@ class Topic:
         self._labels = labels
         fields: dict[Path, Any] = {}
         self._walk(message, (), fields, None)
+        self._add_columns({path: isinstance(value, str) for path, value in fields.items()})
+
+    def _add_columns(self, are_texts: dict[Path, bool]) -> None:
+        """Make columns of the wanted ones of some fields, beside those that there are."""
         names = dict.fromkeys(self.names)
-        for path, value in fields.items():
-            name = f"{self.name}.{_shown(path)}" if path else self.name
+        for path, is_text in are_texts.items():
+            name = self.name_of(path)
             names[name] = None
-            if name in self._columns or (self.wanted is not None and not self.wanted(name)):
-                continue
-            self._columns[name] = Column(path, isinstance(value, str))
+            if name not in self._columns and (self.wanted is None or self.wanted(name)):
+                self._columns[name] = Column(path, is_text)
         self.names = tuple(names)
+
+    def name_of(self, path: Path) -> str:
+        """The signal's name of a field."""
+        return f"{self.name}.{_shown(path)}" if path else self.name
 
     def _walk(self, value: Any, path: Path, fields: dict[Path, Any], only: set[str | int] | None) -> None:
         """Collect the numbers and texts under a value by path; ``only``: in these first fields."""
@@ -195,23 +194,24 @@ class Topic:
         if isinstance(value, np.ndarray | list | tuple):
             self._walk_list(value, path, fields)
             return
-        if len(path) >= _DEEPEST:
-            return
         for key, part in self.parts(value):
-            if not path and only is not None and key not in only:
-                continue
-            if key not in ("frame_id", "child_frame_id") and "covariance" not in key:
+            if (path or only is None or key in only) and not is_left_out(path, key):
                 self._walk(part, (*path, key), fields, only)
 
     def _walk_list(self, values: Any, path: Path, fields: dict[Path, Any]) -> None:
         if not len(values) or isinstance(values[0], str):
             return
         plain = isinstance(values[0], bool | int | float | np.number | np.bool_)
-        if len(values) > (LONGEST_ARRAY if plain else _LONGEST_LIST):
+        if len(values) > (LONGEST_ARRAY if plain else LONGEST_LIST):
             return
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):
             self._walk(value, (*path, k if named is None else named[k]), fields, None)
+
+
+def is_left_out(path: Path, key: str) -> bool:
+    """Whether the field ``key`` of the message at a path is no signal."""
+    return len(path) >= _DEEPEST or key in ("frame_id", "child_frame_id") or "covariance" in key
 
 
 def _in_bursts(receipts: np.ndarray, stamps: np.ndarray) -> bool:

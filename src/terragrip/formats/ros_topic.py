@@ -1,12 +1,7 @@
-"""The messages of one topic of a ROS bag, which come as bytes: those of one layout are read at once.
-
-rosbags reads the first message of every layout, and is what the layout is checked against; it reads all of them where there
-is no layout.
-"""
+"""The messages of one topic of ROS, which come as bytes: those of one layout are read at once."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,31 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import DAMAGE
-from terragrip.formats.messages import BLOCK, Column, Topic, names_of_entries
-from terragrip.formats.ros_layout import Bytes, Layout, Path, layout_of
+from terragrip.formats.messages import BLOCK, Topic
+from terragrip.formats.ros_layout import Bytes, Layout, Serialised, layout_of
 from terragrip.formats.signals import Signal
 from terragrip.formats.table import skips
 
 _TOGETHER, _BYTES = 2000, 4 << 20  # messages that are read at once, and their bytes
-_MOST_LAYOUTS = 32  # of a topic; where there are more, messages are read one by one
-_SECONDS: Path = ("header", "stamp", "sec")
-_NANOSECONDS: Path = ("header", "stamp", "nanosec")
-
-Rows = npt.NDArray[np.intp]
-
-
-@dataclass(frozen=True)
-class Serialised:
-    """How messages of a type are read: ``read`` gives a message as rosbags does, and raises ``errors`` on damage.
-
-    ``fields`` gives rosbags' descriptions of the types' fields; ``one``: the messages are serialised by ROS 1.
-    """
-
-    kind: str
-    one: bool
-    read: Callable[[bytes], Any]
-    fields: Callable[[], Mapping[str, Any]]
-    errors: tuple[type[Exception], ...]
+_MOST_LAYOUTS = 32  # of a topic; where there are more, the layouts of single messages are determined
 
 
 class _Block:
@@ -67,18 +44,14 @@ class RosTopic(Topic):
     _bytes: int = 0
     _number: int = 0
     _layouts: dict[int, list[Layout]] = field(default_factory=dict)
-    _tried: int = 0
 
     def push(self, receipt: float, raw: bytes, form: Serialised) -> None:
         """Take a message that came at ``receipt`` [s]; one that cannot be read is counted."""
-        if form != self._form:
-            self._flush()
-            self._form, self._layouts, self._tried = form, {}, 0
+        self._begin(form)
         if not self._columns:
-            message = self._read(raw)
-            if message is None:
+            if self._new_layout(form, raw) is None:
+                self.bad += 1
                 return
-            self._learn(message, names_of_entries(dict(self.parts(message))))
             if not self._columns:
                 self.count += 1
                 return
@@ -92,14 +65,48 @@ class RosTopic(Topic):
         if len(self._waiting) >= _TOGETHER or self._bytes > _BYTES:
             self._flush()
 
+    def fields(self, raw: bytes, form: Serialised) -> tuple[float, dict[str, Any]] | None:
+        """The sender's stamp [s], NaN if there is none, and the wanted fields of one message by name, for who takes messages as they come.
+
+        Nothing is collected. None where the message cannot be read.
+        """
+        self._begin(form)
+        data = np.frombuffer(raw, np.uint8).reshape(1, -1)
+        known = next((one for one in self._layouts.get(len(raw), []) if one.fits(data)[0]), None)
+        layout = known or self._new_layout(form, raw)
+        if layout is None:
+            return None
+        values = {
+            name: layout.values(one.path, data, is_text=one.is_text) for name, one in self._columns.items()
+        }
+        there = {name: value.tolist()[0] for name, value in values.items() if value is not None}
+        return float(layout.stamps(data)[0]), there
+
     def signals(self) -> tuple[dict[str, Signal], list[str]]:
         """The signals collected, and sentences on them."""
         self._flush()
         return super().signals()
 
+    def _begin(self, form: Serialised) -> None:
+        """Messages of this form come now."""
+        if form != self._form:
+            self._flush()
+            self._form, self._layouts = form, {}
+
+    def _new_layout(self, form: Serialised, raw: bytes) -> Layout | None:
+        """The layout of a message, which is kept, and its fields as columns; None where it cannot be read."""
+        try:
+            layout = layout_of(form, raw)
+        except DAMAGE:
+            return None
+        self._add_columns({**dict.fromkeys(layout.numbers, False), **dict.fromkeys(layout.texts, True)})
+        if sum(map(len, self._layouts.values())) < _MOST_LAYOUTS:
+            self._layouts.setdefault(len(raw), []).append(layout)
+        return layout
+
     def _flush(self) -> None:
         """Read the messages that wait."""
-        raws, came = self._waiting, self._came
+        raws, came, form = self._waiting, self._came, self._form
         self._waiting, self._came, self._bytes = [], [], 0
         block = _Block(len(raws))
         groups: dict[int, list[int]] = {}
@@ -108,19 +115,32 @@ class RosTopic(Topic):
         for size, places in groups.items():
             rows = np.array(places, dtype=np.intp)
             data = np.frombuffer(b"".join([raws[k] for k in places]), np.uint8).reshape(len(rows), size)
-            for layout in self._layouts.get(size, []):
-                rows, data = self._decode_many(layout, rows, data, block)
-            while len(rows):
-                new = self._decode_one(int(rows[0]), data[0].tobytes(), block)
-                rows, data = rows[1:], data[1:]
-                if new is not None:
-                    self._layouts.setdefault(size, []).append(new)
-                    rows, data = self._decode_many(new, rows, data, block)
+            known = iter(list(self._layouts.get(size, [])))
+            while len(rows) and form is not None:
+                layout = next(known, None) or self._new_layout(form, data[0].tobytes())
+                if layout is None:
+                    block.readable[rows[0]] = False
+                    rows, data = rows[1:], data[1:]
+                    continue
+                fitting = layout.fits(data)
+                self._read(layout, rows[fitting], data[fitting], block)
+                rows, data = rows[~fitting], data[~fitting]
         self._append(np.array(came), block)
+
+    def _read(self, layout: Layout, rows: npt.NDArray[np.intp], data: Bytes, block: _Block) -> None:
+        """Read the messages (n, bytes) of a layout into their rows (n,)."""
+        block.stamps[rows] = layout.stamps(data)
+        for name, column in self._columns.items():
+            values = layout.values(column.path, data, is_text=column.is_text)
+            if values is None:
+                self.strange += len(rows)
+            else:
+                block.column(name, is_text=column.is_text)[rows] = values
 
     def _append(self, came: npt.NDArray[np.float64], block: _Block) -> None:
         known = block.readable
         self.count += int(known.sum())
+        self.bad += int((~known).sum())
         self._receipts.frombytes(came[known].tobytes())
         self._stamps.frombytes(block.stamps[known].tobytes())
         for name, column in self._columns.items():
@@ -129,83 +149,3 @@ class RosTopic(Topic):
                 column.texts.extend(values.tolist())
             else:
                 column.numbers.frombytes(values.tobytes())
-
-    def _read(self, raw: bytes) -> Any:
-        """A message, or None and counted where it cannot be read."""
-        assert self._form is not None
-        try:
-            return self._form.read(raw)
-        except (*DAMAGE, *self._form.errors):
-            self.bad += 1
-            return None
-
-    def _decode_one(self, row: int, raw: bytes, block: _Block) -> Layout | None:
-        """Read a message by rosbags; returns its layout, if it has one."""
-        message = self._read(raw)
-        if message is None:
-            block.readable[row] = False
-            return None
-        labels = names_of_entries(dict(self.parts(message)))
-        if labels != self._labels or self._tried < _MOST_LAYOUTS:
-            self._learn(message, labels)  # another layout may have fields that there were none of
-        stamp = self.stamp(message) or np.nan
-        values = self._values(message)
-        block.stamps[row] = stamp
-        for (name, column), value in zip(self._columns.items(), values, strict=True):
-            block.column(name, is_text=column.is_text)[row] = value
-        if self._tried >= _MOST_LAYOUTS:
-            return None
-        self._tried += 1
-        return self._checked_layout(raw, labels, stamp, values)
-
-    def _checked_layout(
-        self, raw: bytes, labels: tuple[str, ...] | None, stamp: float, values: list[Any]
-    ) -> Layout | None:
-        """The layout of a message; None if it does not give the values that rosbags gives."""
-        form = self._form
-        assert form is not None
-        try:
-            layout = layout_of(form.fields(), form.kind, raw, labels, one=form.one)
-            data = np.frombuffer(raw, np.uint8).reshape(1, -1)
-            same = _equal(_stamps(layout, data)[0], stamp)
-            for column, value in zip(self._columns.values(), values, strict=True):
-                own = _read_column(layout, column, data)
-                same = same and _equal(None if own is None else own[0], value)
-        except DAMAGE:
-            return None
-        return layout if same else None
-
-    def _decode_many(self, layout: Layout, rows: Rows, data: Bytes, block: _Block) -> tuple[Rows, Bytes]:
-        """Read the messages of a layout; returns those that have another one."""
-        fitting = layout.fits(data)
-        own, ours = rows[fitting], data[fitting]
-        block.stamps[own] = _stamps(layout, ours)
-        for name, column in self._columns.items():
-            values = _read_column(layout, column, ours)
-            if values is None:
-                self.strange += len(own)
-            else:
-                block.column(name, is_text=column.is_text)[own] = values
-        return rows[~fitting], data[~fitting]
-
-
-def _read_column(layout: Layout, column: Column, data: Bytes) -> Any:
-    """A column of messages (n, bytes); None where the layout lacks it, or has another kind of field there."""
-    if column.is_text:
-        return layout.text(column.path, data) if column.path in layout.texts else None
-    return layout.number(column.path, data) if column.path in layout.numbers else None
-
-
-def _stamps(layout: Layout, data: Bytes) -> npt.NDArray[np.float64]:
-    """The senders' stamps (n,) [s] of messages (n, bytes), NaN where there are none."""
-    if _SECONDS not in layout.numbers or _NANOSECONDS not in layout.numbers:
-        return np.full(len(data), np.nan)
-    result = layout.number(_SECONDS, data) + 1e-9 * layout.number(_NANOSECONDS, data)
-    return np.where(result == 0, np.nan, result)
-
-
-def _equal(first: Any, second: Any) -> bool:
-    if isinstance(first, float) and isinstance(second, float):
-        return bool(first == second or (np.isnan(first) and np.isnan(second)))
-    missing = second is None or (isinstance(second, float) and np.isnan(second))
-    return bool(first == second or (first is None and missing))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from terragrip.formats.boundary import DAMAGE, needed
 from terragrip.formats.messages import Topic
-from terragrip.formats.ros_topic import RosTopic, Serialised
+from terragrip.formats.ros_layout import Serialised
+from terragrip.formats.ros_topic import RosTopic
 from terragrip.formats.table import Wanted
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
@@ -22,12 +23,10 @@ class Types:
 
     def __init__(self, base: str) -> None:
         self._typesys = needed("rosbags.typesys", "a ROS message")
-        self._serde = needed("rosbags.serde", "a ROS message")
         self._base = base
         self._own: dict[str, Any] = {}
         self._common: Any = None
         self.unknown: dict[str, None] = {}
-        self.errors: tuple[type[Exception], ...] = (self._typesys.TypesysError, self._serde.SerdeError)
         self._forms: dict[tuple[str, bool], Serialised] = {}
 
     def learn(self, name: str, definition: str, language: str) -> str:
@@ -44,29 +43,21 @@ class Types:
             lacking = {k: v for k, v in base.fielddefs.items() if k not in given and k not in store.fielddefs}
             store.register({**lacking, **given} if _refers_out(given) else given)
             self._own[name] = store
-        except (*DAMAGE, *self.errors):
+        except (*DAMAGE, self._typesys.TypesysError):
             self.unknown[name] = None
         return name
 
-    def store(self, name: str) -> Any:
-        """The rosbags store that reads a type; raises KeyError if there is none."""
-        if name in self._own:
-            return self._own[name]
-        if name not in self._known().fielddefs:
+    def fields(self, name: str) -> Any:
+        """rosbags' descriptions of a type's fields, and of the types in it; raises KeyError if there are none."""
+        defined = self._own.get(name, self._known()).fielddefs
+        if name not in defined:
             self.unknown[name] = None
             raise KeyError(name)
-        return self._known()
+        return defined
 
     def form(self, name: str, *, one: bool) -> Serialised:
         """How messages of a type are read; ``one``: they are serialised by ROS 1."""
-
-        def read(raw: bytes) -> Any:
-            store = self.store(name)
-            return store.deserialize_ros1(raw, name) if one else store.deserialize_cdr(raw, name)
-
-        return self._forms.setdefault(
-            (name, one), Serialised(name, one, read, lambda: self.store(name).fielddefs, self.errors)
-        )
+        return self._forms.setdefault((name, one), Serialised(name, one, lambda: self.fields(name)))
 
     def notes(self) -> list[str]:
         """A sentence on the types that are unknown."""
@@ -98,14 +89,9 @@ def _refers_out(definitions: dict[str, Any]) -> bool:
     )
 
 
-def ros_topic(name: str, wanted: Wanted | None) -> Topic:
-    """A `Topic` of ROS messages as rosbags gives them."""
-    return Topic(name, _parts, _stamp, wanted)
-
-
 def bag_topic(name: str, wanted: Wanted | None, topics: dict[str, Topic]) -> RosTopic:
     """The topic of a bag of this name, of several connections the same one."""
-    result = topics.setdefault(f"ros {name}", RosTopic(name, _parts, _stamp, wanted))
+    result = topics.setdefault(f"ros {name}", RosTopic(name, wanted=wanted))
     assert isinstance(result, RosTopic)
     return result
 
@@ -122,18 +108,3 @@ def unpacked(raw: bytes) -> bytes:
         return bytes(zstandard.ZstdDecompressor().decompress(raw, max_output_size=_LARGEST_MESSAGE))
     except zstandard.ZstdError:
         return raw  # which no message is: its topic counts it
-
-
-def _parts(message: Any) -> Iterable[tuple[str, Any]]:
-    fields = getattr(message, "__dataclass_fields__", None)
-    if fields is None:
-        return ()
-    names = set(fields) - {"__msgtype__"}
-    if names == {"sec", "nanosec"} or names == {"sec", "nsec"}:
-        return ()  # a time or duration
-    return [(key, getattr(message, key)) for key in fields if key != "__msgtype__"]
-
-
-def _stamp(message: Any) -> float | None:
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    return None if stamp is None else float(stamp.sec + 1e-9 * getattr(stamp, "nanosec", 0))

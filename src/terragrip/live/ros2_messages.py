@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from typing import Any
 
 from terragrip.errors import InputError
-from terragrip.formats.boundary import DAMAGE
-from terragrip.formats.ros_types import Types, ros_topic
+from terragrip.formats.messages import Topic
+from terragrip.formats.ros_types import Types, bag_topic
 from terragrip.live.decode import Decoder
 from terragrip.live.payload import Fields, Unreadable
 from terragrip.live.uri import Uri
@@ -53,17 +52,17 @@ class Reader:
     def __init__(self, decoder: Decoder) -> None:
         self._types = Types("LATEST")
         self._wanted = decoder.wants if decoder.profile is not None else None
-        self._topics: dict[str, Any] = {}
+        self._topics: dict[str, Topic] = {}
 
     def fields(self, topic: str, kind: str, data: bytes) -> Fields:
         """The fields, and ``time`` from the header's stamp; raises Unreadable."""
         try:
-            message = self._types.store(kind).deserialize_cdr(data, kind)
+            self._types.fields(kind)
         except KeyError:
             raise Unreadable(f"of the type {kind}, which does not come with ROS 2") from None
-        except (*DAMAGE, *self._types.errors) as error:
-            raise Unreadable(f"not a {kind} ({type(error).__name__})") from error
-        reader = self._topics.setdefault(topic, ros_topic(topic, self._wanted))
-        result: Fields = reader.fields(message)
-        stamp = reader.stamp(message)
-        return {**result, "time": stamp} if stamp and result else result
+        reader = bag_topic(topic, self._wanted, self._topics)
+        result = reader.fields(data, self._types.form(kind, one=False))
+        if result is None:
+            raise Unreadable(f"not a {kind}")
+        stamp, fields = result
+        return {**fields, "time": stamp} if stamp == stamp and fields else fields
