@@ -1,64 +1,53 @@
-"""Tables that wait on disk while others are worked on: last in, first out."""
+"""Blocks that wait on disk while others are worked on: last in, first out."""
 
 from __future__ import annotations
 
 import os
+import pickle
 import tempfile
-from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import IO, Any, Self
 
 from terragrip.files import unwritable
 
-if TYPE_CHECKING:
-    import pyarrow as pa
 
+class Aside:
+    """A pile in a temporary file without a name, which only this process can open and which ends with it.
 
-class TablesAside:
-    """A pile of tables in a temporary folder, which is made with the first of them and removed at the end.
-
-    ``beside``: the folder in which that one is made, so that it is on the disk that the results go to; None: the system's.
+    ``beside``: the folder on whose disk it is, where the results go too; None: the system's.
     """
 
     def __init__(self, beside: str | os.PathLike[str] | None = None) -> None:
         self._beside = beside
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._count = 0
+        self._file: IO[bytes] | None = None
+        self._places: list[int] = []
 
     def __enter__(self) -> Self:
         return self
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._places)
 
-    def put(self, table: pa.Table) -> None:
-        """Put a table on the pile; raises InputError if it cannot be written."""
-        from pyarrow import feather
-
+    def put(self, block: Any) -> None:
+        """Put a block on the pile; raises InputError if it cannot be written."""
         try:
-            if self._folder is None:
-                self._folder = tempfile.TemporaryDirectory(prefix=".terragrip-", dir=self._beside)
-            feather.write_feather(table, self._path(self._count), compression="uncompressed")
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(dir=self._beside)  # noqa: SIM115 - `__exit__` closes it
+            self._places.append(self._file.seek(0, os.SEEK_END))
+            pickle.dump(block, self._file, protocol=5)
+            self._file.flush()
         except OSError as error:
-            where = self._folder.name if self._folder else self._beside or tempfile.gettempdir()
+            where = self._beside or tempfile.gettempdir()
             raise unwritable(where, error, "free space or choose another folder") from error
-        self._count += 1
 
-    def finish(self) -> pa.Table:
-        """Take the table that was put last off the pile; raises IndexError where there is none."""
-        from pyarrow import feather
-
-        if not self._count:
-            raise IndexError("no table is put aside")
-        self._count -= 1
-        path = self._path(self._count)
-        table = feather.read_table(path, memory_map=False)
-        Path(path).unlink()
-        return table
-
-    def _path(self, number: int) -> str:
-        assert self._folder is not None
-        return str(Path(self._folder.name) / f"{number}.arrow")
+    def finish(self) -> Any:
+        """Take the block that was put last off the pile; raises IndexError where there is none."""
+        place = self._places.pop()
+        assert self._file is not None
+        self._file.seek(place)
+        block = pickle.load(self._file)
+        self._file.truncate(place)
+        return block
 
     def __exit__(self, *failure: object) -> None:
-        if self._folder is not None:
-            self._folder.cleanup()
+        if self._file is not None:
+            self._file.close()

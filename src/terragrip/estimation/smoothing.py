@@ -8,27 +8,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.estimation.arrow import floats, texts
 from terragrip.estimation.estimates import Estimates
-from terragrip.estimation.forward import (
-    carried_channels,
-    finished,
-    flag_before_gaps,
-    prepared,
-    table_of,
-)
-from terragrip.estimation.put_aside import TablesAside
+from terragrip.estimation.forward import finished, flag_before_gaps, prepared, table_of
+from terragrip.estimation.put_aside import Aside
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
 
@@ -64,15 +55,13 @@ def smoothed(
     result. ``beside``: see `terragrip.estimation.put_aside`. ``forward`` and ``backward`` are called with the rows done.
     """
     engine = estimator.engine
-    with TablesAside(beside) as filtered, TablesAside(beside) as finals:
-        behind: list[list[bytes]] = []
+    with Aside(beside) as filtered, Aside(beside) as finals:
         last, rows = None, 0
         for block in blocks:
             done = _filter(estimator, block, step, lambda k, before=rows: forward(before + k))  # type: ignore[misc]
             flag_before_gaps(done.event, None if last is None else last.event)
             if last is not None:
-                filtered.put(_as_table(estimator, last))
-                behind.append(last.snapshots)
+                filtered.put(last)
             last, rows = done, rows + len(block)
         if last is None:
             return
@@ -82,14 +71,14 @@ def smoothed(
             result, following = _smooth(estimator, last, carry, following, notes, step)
             count -= len(result)
             backward(rows - count)
-            if not behind:
+            if not len(filtered):
                 break
-            finals.put(result.to_arrow())
-            last = _of_table(filtered.finish(), last.block, behind.pop())
+            finals.put(result)
+            last = filtered.finish()
         engine.restore(end)
         yield result
         while len(finals):
-            yield Estimates.from_arrow(finals.finish())
+            yield finals.finish()
 
 
 def _filter(estimator: TractionEstimator, block: Recording, step: int, forward: Done) -> _Forward:
@@ -131,28 +120,3 @@ def _smooth(
 
 def _cut(columns: dict[str, Floats], part: slice) -> dict[str, Floats]:
     return {name: values[part] for name, values in columns.items()}
-
-
-_TIME, _EVENT, _INPUT, _LABEL = "time:", "event:", "input:", "label:"
-"""Columns of a block that stands aside, beside those of ``out``; what the names of its channels and labels begin with."""
-
-
-def _as_table(estimator: TractionEstimator, one: _Forward) -> pa.Table:
-    """A filtered block, to be put aside: what the estimator looks at and what is passed on, beside ``out``."""
-    import pyarrow as pa
-
-    inputs = prepared(estimator, one.block)[1]
-    inputs |= {name: one.block.channels[name] for name in carried_channels(one.block, estimator)}
-    columns = {_TIME: one.block.time, **{_INPUT + name: values for name, values in inputs.items()}, **one.out}
-    arrays = {name: floats(values) for name, values in columns.items()}
-    arrays |= {_LABEL + name: texts(values) for name, values in one.block.labels.items()}
-    return pa.table({**arrays, _EVENT: floats(one.event.astype(np.float64))})
-
-
-def _of_table(table: pa.Table, like: Recording, snapshots: list[bytes]) -> _Forward:
-    """The inverse of `_as_table`; ``like``: another block of the recording."""
-    columns = {name: table.column(name).to_numpy() for name in table.column_names}
-    time, event = columns.pop(_TIME), columns.pop(_EVENT).astype(np.uint8)
-    channels = {n.removeprefix(_INPUT): columns.pop(n) for n in [*columns] if n.startswith(_INPUT)}
-    labels = {n.removeprefix(_LABEL): columns.pop(n) for n in [*columns] if n.startswith(_LABEL)}
-    return _Forward(replace(like, time=time, channels=channels, labels=labels), columns, event, snapshots)

@@ -45,41 +45,20 @@ class TableOnDisk:
         """The wanted columns (None: all) of all blocks; raises InputError as these do."""
         every = every_of(wanted)
         chosen = [n for n in self.names if (n not in self.unreadable if wanted is None else wanted(n))]
-        columns = {name: _Growing(self.rows // every) for name in chosen}
+        parts: dict[str, list[Column]] = {name: [] for name in chosen}
         for block in self.blocks(chosen, every):
             for name, values in block.items():
-                columns[name].add(values)
-        joined = {name: column.whole() for name, column in columns.items()}
+                parts[name].append(values)
+        joined = {
+            name: _joined(parts.pop(name)) for name in chosen
+        }  # one by one, so that none stands twice for long
         notes = tuple(dict.fromkeys(self.notes))
         return LogTable(self.names, joined, self.units, self.source, self.digest, notes)
 
 
-class _Growing:
-    """A column that grows by blocks. Blocks are copied as they come: kept and joined at the end, they would stand twice."""
-
-    def __init__(self, rows: int) -> None:
-        self._rows, self._count = int(1.05 * rows) + 1000, 0
-        self._values: Column | None = None
-
-    def add(self, block: Column) -> None:
-        """Append a block; of numbers and texts, all become objects."""
-        if self._values is None:
-            self._values = np.empty(max(self._rows, len(block)), block.dtype)
-        known = self._values
-        kind = known.dtype if known.dtype == block.dtype else _common(known.dtype, block.dtype)
-        end = self._count + len(block)
-        if kind != known.dtype or end > len(known):
-            self._values = np.empty(max(end + end // 4, len(known)), kind)
-            self._values[: self._count] = known[: self._count]
-        self._values[self._count : end] = block
-        self._count = end
-
-    def whole(self) -> Column:
-        """The column so far."""
-        return np.empty(0) if self._values is None else self._values[: self._count]
-
-
-def _common(first: np.dtype[Any], second: np.dtype[Any]) -> np.dtype[Any]:
-    if {first.kind, second.kind} <= set("fiu") or first.kind == second.kind:
-        return np.promote_types(first, second)
-    return np.dtype(object)
+def _joined(parts: list[Column]) -> Column:
+    """A column of its blocks; of numbers and texts, all become objects."""
+    kinds = {part.dtype.kind for part in parts}
+    if len(kinds) > 1 and not kinds <= set("fiu"):
+        parts = [part.astype(object) for part in parts]
+    return np.concatenate(parts) if parts else np.empty(0)
