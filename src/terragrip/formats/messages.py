@@ -7,7 +7,7 @@ JointState has, ``velocity.front_left`` in place of ``velocity[0]``. Covariances
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
@@ -51,7 +51,7 @@ class Topic:
     """Collects the wanted fields of one topic's messages.
 
     ``parts`` gives the fields of a message; ``stamp`` the sender's time [s], if the message has one; ``field_of`` one field by
-    name, where there is a short way to it: it raises LookupError, TypeError or AttributeError where the field is not there.
+    name: it raises LookupError, TypeError or AttributeError where the field is not there.
     These three are for messages that come as objects; those of ROS come as bytes (`terragrip.formats.ros_topic`).
     ``strange``: values that are not there, or of another kind than in the first message.
     """
@@ -60,7 +60,7 @@ class Topic:
     parts: Parts = lambda message: ()
     stamp: Callable[[Any], float | None] = lambda message: None
     wanted: Wanted | None = None
-    field_of: Callable[[Any, str], Any] | None = None
+    field_of: Callable[[Any, str], Any] = dict.__getitem__
     names: tuple[str, ...] = ()
     count: int = 0
     bad: int = 0
@@ -97,7 +97,8 @@ class Topic:
     def _values(self, message: Any) -> list[Any]:
         """The wanted fields of a message, in the order of the columns; what is not there is NaN or None, and counted."""
         values: list[Any] = []
-        for column, value in zip(self._columns.values(), self._held(message), strict=True):
+        for column in self._columns.values():
+            value = self._at(column.path, message)
             if column.is_text:
                 known = isinstance(value, str)
                 values.append(value if known else None)
@@ -107,14 +108,19 @@ class Topic:
             self.strange += not known
         return values
 
-    def _held(self, message: Any) -> list[Any]:
-        """What stands in a message where the columns are, None where nothing does."""
-        paths = [column.path for column in self._columns.values()]
-        if self.field_of is None or self._labels is not None:
-            fields: dict[Path, Any] = {}
-            self._walk(message, (), fields, {path[0] for path in paths if path})
-            return [fields.get(path) for path in paths]
-        return [_at(message, path, self.field_of) for path in paths]
+    def _at(self, path: Path, value: Any) -> Any:
+        """What stands at a path in a message, None if nothing does."""
+        try:
+            for step in path:
+                if isinstance(step, int):
+                    value = value[step]
+                elif isinstance(value, Sequence) and self._labels is not None:
+                    value = value[self._labels.index(step)]
+                else:
+                    value = self.field_of(value, step)
+        except (LookupError, TypeError, AttributeError, ValueError):
+            return None
+        return value
 
     def signals(self) -> tuple[dict[str, Signal], list[str]]:
         """The signals collected, and sentences on them."""
@@ -169,7 +175,7 @@ class Topic:
         """Make columns of the fields of a message, beside those that there are."""
         self._labels = labels
         fields: dict[Path, Any] = {}
-        self._walk(message, (), fields, None)
+        self._walk(message, (), fields)
         self._add_columns({path: isinstance(value, str) for path, value in fields.items()})
 
     def _add_columns(self, are_texts: dict[Path, bool]) -> None:
@@ -186,8 +192,8 @@ class Topic:
         """The signal's name of a field."""
         return f"{self.name}.{_shown(path)}" if path else self.name
 
-    def _walk(self, value: Any, path: Path, fields: dict[Path, Any], only: set[str | int] | None) -> None:
-        """Collect the numbers and texts under a value by path; ``only``: in these first fields."""
+    def _walk(self, value: Any, path: Path, fields: dict[Path, Any]) -> None:
+        """Collect the numbers and texts under a value by path."""
         if isinstance(value, bool | int | float | str | np.number | np.bool_):
             fields[path] = value
             return
@@ -195,8 +201,8 @@ class Topic:
             self._walk_list(value, path, fields)
             return
         for key, part in self.parts(value):
-            if (path or only is None or key in only) and not is_left_out(path, key):
-                self._walk(part, (*path, key), fields, only)
+            if not is_left_out(path, key):
+                self._walk(part, (*path, key), fields)
 
     def _walk_list(self, values: Any, path: Path, fields: dict[Path, Any]) -> None:
         if not len(values) or isinstance(values[0], str):
@@ -206,7 +212,7 @@ class Topic:
             return
         named = self._labels if self._labels and len(self._labels) == len(values) and len(path) == 1 else None
         for k, value in enumerate(values):
-            self._walk(value, (*path, k if named is None else named[k]), fields, None)
+            self._walk(value, (*path, k if named is None else named[k]), fields)
 
 
 def is_left_out(path: Path, key: str) -> bool:
@@ -218,17 +224,6 @@ def _in_bursts(receipts: np.ndarray, stamps: np.ndarray) -> bool:
     """Whether messages (n,) waited for each other on their way, so that the stamps say better when they were sent."""
     usual = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     return usual > 0 and float(np.mean(np.diff(receipts) < _BURST * usual)) > _QUICKEST
-
-
-def _at(message: Any, path: Path, field_of: Callable[[Any, str], Any]) -> Any:
-    """What stands at a path in a message, None if nothing does."""
-    value = message
-    try:
-        for step in path:
-            value = value[step] if isinstance(step, int) else field_of(value, step)
-    except (LookupError, TypeError, AttributeError):
-        return None
-    return value
 
 
 def _shown(path: Path) -> str:
