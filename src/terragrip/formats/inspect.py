@@ -15,7 +15,7 @@ from terragrip.errors import InputError
 from terragrip.formats.fitting import Fit, fit_of
 from terragrip.formats.profile import Profile
 from terragrip.formats.proposal import is_ready, missing_channels, profile_text, refusal
-from terragrip.formats.reading import read, read_log, recording_of
+from terragrip.formats.reading import read_log, recording_of
 from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import days_in, notes_on, numbers_of
@@ -128,8 +128,7 @@ def inspect(
         warnings.insert(0, _SPARSE.format(_size(path) / 1e9, every))
     fits = Fit()
     try:
-        # A long log is not read a second time.
-        recording = read(path, chosen, dbc=databases) if every == 1 else _recording(log, chosen)
+        recording = _recording(log, chosen)
         warnings += [note for note in recording.notes if note not in warnings]
     except InputError as error:
         if profile is not None:

@@ -11,7 +11,8 @@ from terragrip.formats.boundary import as_far_as_it_goes
 from terragrip.formats.mcap import collect
 from terragrip.formats.messages import Topic, log_of
 from terragrip.formats.registry import Databases, Format
-from terragrip.formats.ros_topic import RosTopic, Serialised
+from terragrip.formats.ros_layout import Serialised
+from terragrip.formats.ros_topic import RosTopic
 from terragrip.formats.ros_types import Types, bag_topic, unpacked
 from terragrip.formats.rosbag1 import Connection, records
 from terragrip.formats.signals import SignalLog
