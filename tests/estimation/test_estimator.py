@@ -119,6 +119,9 @@ def test_an_estimate_is_read_by_name(noisy):
         ({"ground_speed": math.inf}, "ground_speed is inf"),
         ({"drive_torque_fl": -math.inf}, "drive_torque_fl is -inf"),
         ({"ground_speed": "fast"}, "ground_speed is 'fast'"),
+        ({"wheel_sped_fl": 2.0}, "knows no wheel_sped_fl; did you mean wheel_speed_fl"),
+        ({"wheel_speed_fl2": 2.0}, "knows no wheel_speed_fl2; did you mean wheel_speed_fl"),
+        ({"DriveTorque_RR": 2.0}, "did you mean drive_torque_rr"),
     ],
 )
 def test_an_unusable_sample_is_refused_and_changes_nothing(noisy, change, says):

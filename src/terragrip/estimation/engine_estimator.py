@@ -76,6 +76,11 @@ class EngineEstimator(TractionEstimator):
         """Where in an estimate's values each column stands."""
         return self._places
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The bus's channels."""
+        return self.given
+
     def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
         """As of any machine; the sample has the bus's channels. ``converted`` then holds those of the machine of driven wheels."""
         row = [_number(sample.get(name)) for name in self.given]

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, nearest
 from terragrip.estimation import rims as speeds
 from terragrip.estimation.engine import EVENTS, Engine, estimate_slots, refusal
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
@@ -18,6 +18,7 @@ from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
 from terragrip.recording.lag import delay_of, lag_within
+from terragrip.recording.schema import is_own, split_channel
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -125,6 +126,7 @@ class TractionEstimator:
         self.slip_reference: SlipReference | None = None
         self.track: Track | None = None
         self.rims: tuple[Rim, ...] = ()
+        self._accepted: set[str] = set()
         if speeds_alone(self.channels, vehicle):
             self.method = SLIP_ONLY.name
             self.rims = rims_of(vehicle, self.channels)
@@ -211,16 +213,37 @@ class TractionEstimator:
 
         ``sample`` maps ``time`` [s] and recording columns to SI numbers. A column that is absent, None or NaN
         was not measured at that instant; columns that the estimator does not use are ignored. Raises
-        InputError, with the estimator unchanged, if time is missing or does not increase, or a value is not a
-        finite number.
+        InputError, with the estimator unchanged, if time is missing or does not increase, a value is not a
+        finite number, or a name is no column but like one that the estimator uses (mistyped, or of a wheel that the vehicle lacks).
         """
+        if not self._accepted.issuperset(sample.keys()):
+            self._accept(sample.keys())
         time = sample.get("time")
         if time is None:
             raise unusable(sample, self._engine.inputs)
         return self.update_at(time, sample)
 
+    def _accept(self, names: Collection[str]) -> None:
+        """Know the names of a sample's columns; raises InputError on one that is mistyped."""
+        owners = ("", *self.vehicle.wheels, *self.vehicle.axle_names)
+        for name in set(names) - self._accepted:
+            own = is_own(name) and (split_channel(name) or ("", ""))[1] in owners
+            like = None if own else nearest(name, self.inputs)
+            if like:
+                raise InputError(
+                    f"the estimator knows no {name}",
+                    place="sample",
+                    hint=f"did you mean {like}? If not, leave it out",
+                )
+            self._accepted.add(name)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The columns of a sample that are used beside ``time``."""
+        return self._engine.inputs
+
     def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
-        """As `update`, with the instant [s] as an argument beside the sample."""
+        """As `update`, with the instant [s] as an argument beside the sample, and no look at its names."""
         engine = self._engine
         try:
             status = engine.update(time, sample)
