@@ -71,11 +71,23 @@ def doubt(cells: Sequence[str | None]) -> tuple[int, str, str] | None:
     return row, problem, f"write 2024-04-03, or in a profile 'dates: {ORDERS[0]}' (or {ORDERS[1]}) for time"
 
 
-def _matches(cells: Sequence[str | None]) -> list[re.Match[str] | None] | None:
-    """The cells by the form of the first that is not empty, None for an empty one; None altogether where one has another form."""
+def misfit(cells: Sequence[str | None]) -> int | None:
+    """The place of the first cell that is not written as the times before it are; None where the first is no time either."""
+    form = _form(cells)
+    rows = (row for row, cell in enumerate(cells) if cell and form and not form.fullmatch(cell.strip()))
+    return next(rows, None)
+
+
+def _form(cells: Sequence[str | None]) -> re.Pattern[str] | None:
+    """The form of the first cell that is not empty."""
     first = next((cell for cell in cells if cell), None)
     forms = (_TIME, *_NAMED, _EITHER)
-    form = next((f for f in forms if first is not None and f.fullmatch(first.strip())), None)
+    return next((f for f in forms if first is not None and f.fullmatch(first.strip())), None)
+
+
+def _matches(cells: Sequence[str | None]) -> list[re.Match[str] | None] | None:
+    """The cells by the form of the first that is not empty, None for an empty one; None altogether where one has another form."""
+    form = _form(cells)
     if form is None:
         return None
     matches = [form.fullmatch(cell.strip()) if cell else None for cell in cells]

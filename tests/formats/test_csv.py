@@ -114,6 +114,52 @@ def test_a_last_row_that_was_cut_off_is_left_out(tmp_path: Path, log: pd.DataFra
     assert any("cut off" in note for note in recording.notes)
 
 
+def test_a_last_row_that_was_cut_off_leaves_dates_as_they_are(tmp_path: Path) -> None:
+    rows = "".join(f"11.05.2026 08:12:0{k},0;{k},5;5\n" for k in range(4))
+    whole = read(str(put(tmp_path, "time;ground_speed;wheel_speed_l\n" + rows)))
+    cut = read(str(put(tmp_path, "time;ground_speed;wheel_speed_l\n" + rows + "11.05.2026 08:1", "cut.csv")))
+    np.testing.assert_array_equal(cut.time, [0.0, 1.0, 2.0, 3.0])
+    assert cut.start == whole.start
+    assert any("cut off" in note for note in cut.notes)
+
+
+MIXED = {
+    "a sheet's error": (["1,136", "#DIV/0!"], "column v, row 11 .*'#DIV/0!' is not a number"),
+    "a point among commas": (
+        ["1,136", "1.2"],
+        "column v, row 11 .*'1.2' has a decimal point, other rows a comma",
+    ),
+    "a comma among points": (
+        ["1.13", "0,2"],
+        "column v, row 11 .*'0,2' has a decimal comma, other rows a point",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", MIXED)
+def test_the_cell_is_named_that_differs_from_the_others(tmp_path: Path, kind: str) -> None:
+    (usual, odd), message = MIXED[kind]
+    other = "2,5" if "," in usual else "2.5"
+    rows = [f"{k};{odd if k == 10 else usual};{other}" for k in range(20)]
+    path = put(tmp_path, "\n".join(["t;v;w", *rows, ""]))
+    profile = put(tmp_path, "time: {from: t}\nchannels: {ground_speed: v, wheel_speed_l: w}", "p.yaml")
+    with pytest.raises(InputError, match=message):
+        read(str(path), str(profile))
+
+
+def test_a_row_of_means_below_the_dates_is_named(tmp_path: Path) -> None:
+    rows = [f"11.05.2026 08:12:0{k},0;1,5;5" for k in range(4)]
+    path = put(tmp_path, "\n".join(["Zeit;v;w", *rows, "Mittelwert;1,5;5", ""]))
+    profile = put(tmp_path, "time: {from: Zeit}\nchannels: {ground_speed: v, wheel_speed_l: w}", "p.yaml")
+    with pytest.raises(InputError, match="column Zeit, row 5: 'Mittelwert' is not a time"):
+        read(str(path), str(profile))
+
+
+def test_a_header_with_blanks_and_no_rows_is_an_empty_table(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the table is empty"):
+        read(str(put(tmp_path, "time [s];ground_speed [m/s];wheel_speed_l [1/min]\n")))
+
+
 def test_a_number_in_the_first_row_of_a_text_column_is_no_units_row(tmp_path: Path) -> None:
     table = read_table(put(tmp_path, "time,state\n0,s\n1,m\n"))
     assert list(table.columns["state"]) == ["s", "m"]

@@ -138,7 +138,7 @@ def split(line: str, separator: str) -> list[str]:
 def _best(lines: list[str]) -> tuple[str, str]:
     """Separator and decimal sign under which the lines make the best table."""
     best, chosen = (-1.0, -1.0, -1.0, -1.0), (",", ".")
-    for separator in (*_SEPARATORS, " "):
+    for separator in (*_SEPARATORS, *" " * (len(lines) > 1)):  # names may have blanks in them
         table = [split(line, separator) for line in lines]
         width = len(table[0])
         body = table[1:]
@@ -147,7 +147,7 @@ def _best(lines: list[str]) -> tuple[str, str]:
         usual = max(set(widths), key=widths.count) if body else width
         fitting = sum(abs(own - usual) <= 1 for own in widths) / len(body) if body else 1.0
         fitting *= usual > 1 or abs(usual - width) <= 1
-        named = float(abs(usual - width) <= 1)  # names may have blanks in them
+        named = float(abs(usual - width) <= 1)
         for decimal in (".",) if separator == "," else (".", ","):
             cells = [cell for row in body[:20] for cell in row]
             numbers = sum(_is_number(cell, decimal) for cell in cells)

@@ -57,7 +57,8 @@ class TableOnDisk:
 
 
 def _joined(parts: list[Column]) -> Column:
-    """A column of its blocks; of numbers and texts, all become objects."""
+    """A column of its blocks; of numbers and texts, all become objects. One without rows, as a cut line leaves it, has no type."""
+    parts = [part for part in parts if len(part)]
     kinds = {part.dtype.kind for part in parts}
     if len(kinds) > 1 and not kinds <= set("fiu"):
         parts = [part.astype(object) for part in parts]

@@ -12,7 +12,7 @@ from terragrip.errors import InputError
 from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
-from terragrip.written_times import doubt, times_of
+from terragrip.written_times import doubt, misfit, times_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -119,6 +119,10 @@ def stamps_of(
         row, problem, hint = doubtful
         page = "formats#in-a-profile"
         raise InputError(problem, file=source, place=place(name, row), hint=hint, page=page)
+    odd = misfit(cells)
+    if odd is not None:
+        problem = f"{_shown(cells[odd])} is not a time, as the rows before have it"
+        raise InputError(problem, file=source, place=place(name, odd), hint="correct or delete that row")
     return column
 
 
@@ -187,16 +191,43 @@ def _refuse_thousands(name: str, column: npt.NDArray[Any], time: Floats | None, 
 
 
 def _cell_by_cell(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
-    """Convert a column of mixed objects; missing cells become NaN."""
-    result = np.full(len(column), np.nan)
-    for row, cell in enumerate(column.tolist()):
-        blank = isinstance(cell, str) and not cell.strip()
-        if cell is None or blank or type(cell).__name__ in ("NAType", "NaTType"):
-            continue
-        try:
-            result[row] = float(cell)
-        except (TypeError, ValueError, OverflowError):
-            text = repr(cell) if len(repr(cell)) <= 30 else repr(cell)[:27] + "..."
-            problem, hint = complaint(str(cell)) or (f"{text} is not a number", "give numbers in SI")
-            raise InputError(problem, file=source, place=place(name, row, time), hint=hint) from None
-    return result
+    """Convert a column of mixed objects; missing cells become NaN. Refused is the first cell that is not written as most others are."""
+    cells = {
+        row: cell
+        for row, cell in enumerate(column.tolist())
+        if cell is not None
+        and not (isinstance(cell, str) and not cell.strip())
+        and type(cell).__name__ not in ("NAType", "NaTType")
+    }
+    points = {row: number for row, cell in cells.items() if (number := _number(cell)) is not None}
+    commas = [
+        row
+        for row, cell in cells.items()
+        if "." not in str(cell) and _number(str(cell).replace(",", ".")) is not None
+    ]
+    if len(points) == len(cells):
+        result = np.full(len(column), np.nan)
+        result[list(points)] = list(points.values())
+        return result
+    by_comma = len(commas) > len(points)
+    usual = set(commas) if by_comma and len(commas) < len(cells) else points
+    row = next(row for row in cells if row not in usual)
+    problem, hint = f"{_shown(cells[row])} is not a number", "leave the cell empty or give a number"
+    if (row in points if by_comma else "," in str(cells[row]) and row in commas) and usual:
+        signs = "point, other rows a comma" if by_comma else "comma, other rows a point"
+        problem, hint = f"{_shown(cells[row])} has a decimal {signs}", "write all rows alike"
+    elif by_comma and usual is points:
+        hint = "write numbers with a decimal point"
+    problem, hint = (not by_comma and complaint(str(cells[row]))) or (problem, hint)
+    raise InputError(problem, file=source, place=place(name, row, time), hint=hint)
+
+
+def _number(cell: Any) -> float | None:
+    try:
+        return float(cell)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _shown(cell: Any) -> str:
+    return repr(cell) if len(repr(cell)) <= 30 else repr(cell)[:27] + "..."
