@@ -35,7 +35,7 @@ class Intervals:
     score: dict[str, float]
 
 
-def calibrated(result: SimulationResult) -> Vehicle:
+def knowing_nearly(result: SimulationResult) -> Vehicle:
     """The vehicle file as a perfect calibration leaves it: true gains, offsets and radii, a fifth of the prior spreads."""
     data: dict[str, Any] = knowing(result).to_dict()
     still_unknown = ("slope", "vertical_load")
@@ -71,7 +71,7 @@ def intervals(result: SimulationResult, estimates: Estimates, driven: list[str],
 
 def oracle_scores(result: SimulationResult, driven: list[str], moving: Flags) -> dict[str, float]:
     """The oracle's mean interval score of adhesion, slip and soil resistance."""
-    vehicle, truth = calibrated(result), result.truth
+    vehicle, truth = knowing_nearly(result), result.truth
     plain = plain_filter(result.recording, vehicle)
     n, wheels = len(vehicle.wheels), [vehicle.wheels.index(w) for w in driven]
     best = dict.fromkeys(SCORED, np.inf)
