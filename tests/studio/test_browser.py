@@ -202,7 +202,7 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
 ) -> None:
     diagram(folder)
     open_fit(page, served)
-    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    page.select_option("select[aria-label='Open a picture from the folder']", "scan.png")
     sheet = page.wait_for_selector("dialog .sheet")
     box = sheet.bounding_box()
     scale = box["width"] / 800
@@ -248,7 +248,7 @@ def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
 def test_one_origin_is_clicked_for_both_axes(page: Any, served: Served, folder: Path) -> None:
     diagram(folder)
     open_fit(page, served)
-    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    page.select_option("select[aria-label='Open a picture from the folder']", "scan.png")
     box = page.wait_for_selector("dialog .sheet").bounding_box()
     scale = box["width"] / 800
     for point in ((0.0, 0.0), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9)):
@@ -292,7 +292,7 @@ def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, fo
     page.goto(served.url)
     page.wait_for_selector("text=recording.parquet")
     served.stop()
-    page.wait_for_selector("text=does not answer; trying again")
+    page.wait_for_selector("text=does not respond; trying again")
     served.start()
     page.wait_for_function("() => document.getElementById('connection').textContent === ''")
     (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")
@@ -332,8 +332,8 @@ def test_drive_zooms_brushes_and_explains_a_sample(page: Any, served: Served) ->
     page.click("button[aria-label='Next sample']")
     page.wait_for_function("t => document.querySelector('.sample strong').textContent !== t", arg=time_of)
     page.click("text=Panels")
-    page.check("text=Filter's honesty: NIS")
-    page.wait_for_selector('[aria-label="Filter\'s honesty: NIS over time"]')
+    page.check("text=Consistency of the filter: NIS")
+    page.wait_for_selector('[aria-label="Consistency of the filter: NIS over time"]')
     page.focus(".charts")
     shown = "() => window.terragripDrive.charts.range"
     before = page.evaluate(shown)

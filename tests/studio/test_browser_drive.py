@@ -113,7 +113,7 @@ def test_a_replaced_run_is_shown_anew_and_a_removed_one_is_said(
     open_drive(page, served, "estimates.parquet")
     recording, vehicle = tg.read(folder / "recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
     tg.estimate(recording.select(slice(0, 1500)), vehicle).write(folder / "estimates.parquet")
-    page.wait_for_selector(".note:has-text('was replaced: shown anew')")
+    page.wait_for_selector(".note:has-text('was replaced: reloaded')")
     page.wait_for_function("() => window.terragripDrive.charts.whole[1] < 16")
     (folder / "estimates.parquet").unlink()
     page.wait_for_selector(".charts:has-text('was removed from the folder')")
@@ -127,7 +127,7 @@ def test_a_link_to_what_is_not_there_opens_no_other_run(
 ) -> None:
     (folder / "broken.parquet").write_bytes(b"PAR1 broken")
     page.goto(f"{served.url}/#/{where}?path={path}")
-    said = f".charts:has-text('{path} holds no estimates')"
+    said = f".charts:has-text('{path} contains no estimates')"
     page.wait_for_selector(said)
     page.emulate_media(color_scheme="dark")
     page.wait_for_function("() => document.documentElement.dataset.theme === 'dark'")

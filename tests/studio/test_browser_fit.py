@@ -138,7 +138,7 @@ def test_the_loupe_shows_the_picture_while_a_line_is_digitised(
     )
     open_fit(page, served)
     page.wait_for_selector("option[value='scan.png']", state="attached")
-    page.select_option("select[aria-label='Open a picture of the folder']", "scan.png")
+    page.select_option("select[aria-label='Open a picture from the folder']", "scan.png")
     page.wait_for_selector("text=Digitise a line")
     at = page.evaluate(
         "() => { const { plot } = window.terragripFit; const b = plot.element.getBoundingClientRect();"

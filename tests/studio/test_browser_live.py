@@ -24,7 +24,7 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
         page.wait_for_selector("#health:has-text('ms behind')")
         for mode in ("silent", "frozen"):
             service.mode = mode
-            page.wait_for_selector("#live-age:has-text('s old: no rows come')")
+            page.wait_for_selector("#live-age:has-text('s old: no new rows')")
             assert page.evaluate(mark) == "line-through"
             assert page.inner_text("#live-state") == "no measurements"
             page.wait_for_function("() => !document.getElementById('health').textContent.includes('behind')")
@@ -37,14 +37,14 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
             page.wait_for_selector("#live-age", state="hidden")
             assert page.evaluate(mark) == "none"
         service.mode = "predicted"
-        page.wait_for_selector("#live-age:has-text('Predicted: nothing was measured for')")
+        page.wait_for_selector("#live-age:has-text('Predicted: no measurement for')")
         assert page.evaluate(mark) == "underline"
         assert (
             page.evaluate("() => getComputedStyle(document.querySelector('.tile .big')).fontStyle")
             == "italic"
         )
         service.mode = "silent"
-        page.wait_for_selector("#live-age:has-text('s old: no rows come')")
+        page.wait_for_selector("#live-age:has-text('s old: no new rows')")
         service.stop()
         page.wait_for_selector("#live-state:has-text('connection lost')")
         page.wait_for_selector("#live-age:has-text('s old')")

@@ -88,7 +88,7 @@ def test_a_basemap_is_remembered_where_it_was_laid(page: Any, served: Served, fo
     page.wait_for_selector("option[value='field.png']", state="attached")
     page.select_option("select[aria-label='Basemap']", "field.png")
     page.fill("#edge-north", "50.5")
-    page.click("text=Lay it down")
+    page.click("text=Place it")
     page.wait_for_function("() => window.terragripMap.map.getSource('base')")
     page.goto("about:blank")
     open_map(page, served)

@@ -164,10 +164,10 @@ def test_a_columns_choice_unit_and_sign_reach_the_profile(
     row = page.locator('[data-channel="ground_speed"]')
     assert "a speed over ground" in row.inner_text()
     assert row.locator(".outline path").get_attribute("d")
-    page.click("button[aria-label='Turn the sign of ground_speed']")
+    page.click("button[aria-label='Change the sign of ground_speed']")
     assert (
         page.evaluate("() => document.activeElement.getAttribute('aria-label')")
-        == "Turn the sign of ground_speed"
+        == "Change the sign of ground_speed"
     )
     page.fill("input[aria-label='Unit of ground_speed']", "m/s")
     page.select_option("#column-pitch", "")

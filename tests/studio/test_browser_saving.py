@@ -123,7 +123,7 @@ def test_the_map_is_saved_as_drawings(page: Any, served: Served, folder: Path, t
     open_map(page, served)
     page.wait_for_selector("option[value='field.png']", state="attached")
     page.select_option("select[aria-label='Basemap']", "field.png")
-    page.click("text=Lay it down")  # over all that is shown
+    page.click("text=Place it")  # over all that is shown
     page.wait_for_function("() => window.terragripMap.map.getSource('base')")
     drawing = saved(page, "svg", tmp_path)
     words = words_of(drawing)

@@ -46,7 +46,7 @@ def test_wheels_are_named_as_the_vehicle_has_them(page: Any, served: Served, fol
     page.select_option("#wheel-vl", "fl")
     page.select_option("#wheel-vr", "fl")
     page.click("#use-columns")
-    page.wait_for_selector(".note.error:has-text('vl and vr have been given one name')")
+    page.wait_for_selector(".note.error:has-text('vl and vr have the same name')")
     page.select_option("#wheel-vr", "fr")
     assert page.inner_text("label[for='column-wheel_speed_hr']").startswith("rr:")
     page.click("#use-columns")

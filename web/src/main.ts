@@ -61,7 +61,7 @@ function drawBar(current: string): void {
 notices.on((notice) => {
   if (notice.kind !== "connection") return;
   const state = document.getElementById("connection");
-  if (state) state.textContent = notice.up ? "" : "The studio does not answer; trying again …";
+  if (state) state.textContent = notice.up ? "" : "The studio does not respond; trying again …";
 });
 
 document.querySelector(".skip")?.addEventListener("click", (event) => {

@@ -46,7 +46,7 @@ describe("a calibrated picture", () => {
     expect(mapOf({ slip: null, adhesion: good.adhesion })).toContain("two points");
     const same = { marks: [good.slip.marks[0], { ...good.slip.marks[1], value: good.slip.marks[0].value }], log: false } as Axis;
     expect(mapOf({ ...good, slip: same })).toContain("differ");
-    expect(mapOf({ slip: good.slip, adhesion: good.slip })).toContain("same way");
+    expect(mapOf({ slip: good.slip, adhesion: good.slip })).toContain("same direction");
     const zero = { marks: [{ pixel: [0, 0], value: 0 }, { pixel: [9, 9], value: 1 }], log: true } as Axis;
     expect(mapOf({ ...good, slip: zero })).toContain("positive");
   });

@@ -154,7 +154,7 @@ export class Across {
 /** How many points there are, how many of them are drawn, and how many lie beyond the axes. */
 function captionOf(all: Pairs[], beyond: number): string {
   const [drawn, there] = [all.reduce((sum, one) => sum + one.time.length, 0), all.reduce((sum, one) => sum + one.of, 0)];
-  if (!there) return "Nothing is known of both in what the charts show.";
+  if (!there) return "No row in the charts has values of both.";
   const count = (n: number): string => n.toLocaleString("en").replaceAll(",", " ");
   return `${drawn < there ? `${count(drawn)} of the ${count(there)} samples that the charts show, thinned evenly` : `The ${count(there)} samples that the charts show`}${beyond ? `; ${count(beyond)} of those drawn lie beyond the axes` : ""}.`;
 }

@@ -40,7 +40,7 @@ const WORK: [string, string][] = [
   ["hectares_per_hour", "ha/h"],
   ["litres_per_hour", "l/h"],
   ["litres_per_hectare_measured", "l/ha measured"],
-  ["litres_per_hectare", "l/ha by the pull"],
+  ["litres_per_hectare", "l/ha from the pull"],
 ];
 
 export class AdvicePanel {
@@ -76,13 +76,13 @@ export class AdvicePanel {
     if (!this.element.open || this.asked === `${path} ${version}`) return;
     this.asked = `${path} ${version}`;
     if (!path) return fill(this.body, h("p", { class: "hint" }, "No run is open."));
-    fill(this.body, h("p", { class: "hint" }, "Working it out …"));
+    fill(this.body, h("p", { class: "hint" }, "Computing …"));
     const found = await tried(() => get<Advice>("advice", { path, version }));
     if (this.path !== path || this.version !== version) return; // another run was opened meanwhile
     if (found) this.draw((this.known = found));
     else {
       this.asked = "";
-      fill(this.body, h("p", { class: "hint" }, "There is none for this run; the message says why."));
+      fill(this.body, h("p", { class: "hint" }, "No advice for this run; the message gives the reason."));
     }
   }
 

@@ -1,4 +1,4 @@
-/** The upright axis of a chart: what it spans, and what lies beyond it. */
+/** The vertical axis of a chart: what it spans, and what lies beyond it. */
 
 import type uPlot from "uplot";
 import { digits } from "../ui/dom";

@@ -36,10 +36,10 @@ export class Charts {
   range: Range = [0, 1];
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
-  /** An upright axis was set, or follows its values again. */
+  /** A vertical axis was set, or follows its values again. */
   onUpright: (() => void) | null = null;
   onRange: ((range: Range) => void) | null = null;
-  /** Ends of upright axes that the user set, in SI, by the panel's key; the others follow their values. */
+  /** Ends of vertical axes that the user set, in SI, by the panel's key; the others follow their values. */
   uprights: Record<string, Range> = {};
   /** The time of the sample that was picked. */
   picked: number | null = null;
@@ -104,7 +104,7 @@ export class Charts {
     return this.range[0] <= low && this.range[1] >= high;
   }
 
-  /** The ends of a chart's upright axis. */
+  /** The ends of a chart's vertical axis. */
   scale(number: number): Range | null {
     const { min, max } = this.plots[number]?.plot.scales["y"] ?? {};
     return typeof min === "number" && typeof max === "number" ? [min, max] : null;
@@ -182,7 +182,7 @@ export class Charts {
     for (const { plot } of this.plots) plot.redraw(false);
   }
 
-  /** Set an upright axis, in SI; null lets it follow its values. */
+  /** Set a vertical axis, in SI; null lets it follow its values. */
   setUpright(key: string, range: Range | null): void {
     if (range && !(range[1] > range[0])) return;
     if (range) this.uprights[key] = range;
@@ -239,9 +239,9 @@ export class Charts {
         : h(
             "span",
             { class: "upright" },
-            upright("y+", "Stretch the upright axis", () => zoomed(now(), middle(), 0.6)),
-            upright("y−", "Shrink the upright axis", () => zoomed(now(), middle(), 1 / 0.6)),
-            upright("auto", "Let the upright axis follow its values", () => null),
+            upright("y+", "Stretch the vertical axis", () => zoomed(now(), middle(), 0.6)),
+            upright("y−", "Shrink the vertical axis", () => zoomed(now(), middle(), 1 / 0.6)),
+            upright("auto", "Fit the vertical axis to its values", () => null),
           );
       const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over ${AXES[this.axis].title}` }, h("div", { class: "chart-head" }, h("h2", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
       box.classList.toggle("fixed", panel.key in this.uprights);

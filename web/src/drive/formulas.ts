@@ -91,7 +91,7 @@ export class FormulaList {
         return h(
           "li",
           {},
-          h("button", { type: "button", class: "name", title: "Change it", click: () => this.edit(one) }, h("span", {}, `${one.name} [${one.unit || "?"}]`), h("code", {}, one.text), fault ? h("span", { class: "bad" }, fault.replace(/^formula: /, "")) : null),
+          h("button", { type: "button", class: "name", title: "Edit", click: () => this.edit(one) }, h("span", {}, `${one.name} [${one.unit || "?"}]`), h("code", {}, one.text), fault ? h("span", { class: "bad" }, fault.replace(/^formula: /, "")) : null),
           h("button", { type: "button", class: "quiet", "aria-label": `Remove ${one.name}`, click: () => this.keep(this.all.filter((other) => other !== one), null) }, "×"),
         );
       }),
@@ -123,8 +123,8 @@ export class FormulaList {
       this.say(fault);
       input.focus();
     };
-    if (!NAME.test(made.name)) return refuse(this.name, "The name takes letters, digits, spaces, . _ + -");
-    if (!UNIT.test(made.unit)) return refuse(this.unit, "The unit takes no ] and starts without a space");
+    if (!NAME.test(made.name)) return refuse(this.name, "A name may contain letters, digits, spaces, . _ + -");
+    if (!UNIT.test(made.unit)) return refuse(this.unit, "A unit may not contain ] or begin with a space");
     if (!layer) return refuse(this.text, "Choose a run first");
     try {
       await check(layer, [made.text]);

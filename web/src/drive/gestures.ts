@@ -37,7 +37,7 @@ export function listenToPointers(over: HTMLElement, moved: Moved): void {
     "wheel",
     (event) => {
       const { range, whole } = moved;
-      if (event.altKey) return; // the upright axis
+      if (event.altKey) return; // the vertical axis
       if (event.ctrlKey || event.shiftKey) {
         event.preventDefault();
         const at = range[0] + (event.offsetX / over.clientWidth) * (range[1] - range[0]);
@@ -66,7 +66,7 @@ export function listenToPointers(over: HTMLElement, moved: Moved): void {
   for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) over.addEventListener(end, (event) => fingers.delete(event.pointerId));
 }
 
-/** The wheel on an upright axis (with alt also over the chart) zooms it, a drag along it moves it, a double click lets it follow. */
+/** The wheel on a vertical axis (with alt also over the chart) zooms it, a drag along it moves it, a double click lets it follow. */
 export function listenToUpright(root: HTMLElement, over: HTMLElement, now: () => Range, set: (range: Range | null) => void): void {
   const place = (event: MouseEvent): { share: number; axis: boolean } => {
     const box = over.getBoundingClientRect();

@@ -1,4 +1,4 @@
-/** Layouts by name: which panels, wheels and formulas are shown, what is plotted over what and where upright axes end. Kept by this browser. */
+/** Layouts by name: which panels, wheels and formulas are shown, what is plotted over what and where vertical axes end. Kept by this browser. */
 
 import { fill, h } from "../ui/dom";
 import { note } from "../ui/notes";
@@ -42,7 +42,7 @@ export function layouts(now: () => Layout, show: (layout: Layout) => void): HTML
       const word = name.value.trim();
       if (!word) return name.focus();
       keep({ ...all, [word]: now() });
-      note(`Layout ${word} is kept in this browser`);
+      note(`Layout ${word} is stored in this browser`);
       document.getElementById("layout-name")?.focus();
     };
     fill(

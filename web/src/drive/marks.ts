@@ -26,7 +26,7 @@ export function spans(plot: uPlot, run: Run, way: Way): void {
   ctx.restore();
 }
 
-/** An upright line with a head. */
+/** A vertical line with a head. */
 export function pick(plot: uPlot, place: number): void {
   const { ctx, bbox } = plot;
   const x = plot.valToPos(place, "x", true);

@@ -32,7 +32,7 @@ const KEY = "terragrip-drive-panels";
 const HINT = "Drag or shift+wheel zooms, arrow keys pan, double click shows all.";
 const HINT_NARROW = "Two fingers zoom, one pans.";
 const NARROW = matchMedia("(max-width: 600px)"); // as in the style sheet
-const CLICK = "Click a chart to see everything known of that moment, and why µ moved. ◀ ▶ step through samples.";
+const CLICK = "Click a chart to see all values at that instant, and why µ changed. ◀ ▶ step through samples.";
 
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
@@ -50,11 +50,11 @@ export const page: Page = (main, { notices, query }) => {
     back.disabled = !views.canBack;
     forward.disabled = !views.canForward;
   });
-  const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "The times shown before (Backspace)" }, "Back");
-  const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Forward again" }, "↷");
+  const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "Previous time range (Backspace)" }, "Back");
+  const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Next time range" }, "↷");
   const advice = new AdvicePanel();
   const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
-  const over = h("select", { id: "over", "aria-label": "Drawn over" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
+  const over = h("select", { id: "over", "aria-label": "Horizontal axis" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
   const overlay = overlayChooser((paths) => lay(paths));
   let layers: Layer[] = []; // the run and those over it
   let run: Run | null = null;
@@ -92,7 +92,7 @@ export const page: Page = (main, { notices, query }) => {
     h("section", { class: "middle", "aria-label": "Charts" }, tools, legend, charts.element, h("div", { class: "foot" }, readout)),
     h(
       "aside",
-      { class: "panel", "aria-label": "Plane and sample" },
+      { class: "panel", "aria-label": "Scatter plot and sample" },
       across.element,
       list.element,
       advice.element,
@@ -364,13 +364,13 @@ export const page: Page = (main, { notices, query }) => {
     if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
     else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
     else if (now !== seen.get(wanted) || !run) {
-      if (run && seen.has(wanted)) note(`${wanted} was replaced: shown anew`);
+      if (run && seen.has(wanted)) note(`${wanted} was replaced: reloaded`);
       seen.set(wanted, now);
       await open(wanted);
     } else if (others.some((other) => runs.get(other) !== seen.get(other))) {
       const [there, gone] = [others.filter((other) => runs.has(other)), others.filter((other) => !runs.has(other))];
       for (const other of gone) note(`${other} was removed from the folder`);
-      for (const other of there) if (runs.get(other) !== seen.get(other)) note(`${other} was replaced: shown anew`);
+      for (const other of there) if (runs.get(other) !== seen.get(other)) note(`${other} was replaced: reloaded`);
       await lay(there);
     } else overlay.draw([...runs.keys()], path, others);
   });

@@ -123,7 +123,7 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
     { key: "torque", title: "Drive torque, measured", unit: "torque", traces: wheels.flatMap((w) => measured(`drive_torque_${w}`, w, color(w)).map(solid)) },
     { key: "drawbar", title: "Drawbar force, measured", unit: "force", traces: measured("drawbar_force", "pull", "green").map(solid) },
     { key: "curve", title: "Online curve: a", unit: "–", traces: one("curve_a", "a", "green"), low: 0, high: 2.5 },
-    { key: "nis", title: "Filter's honesty: NIS", unit: "–", ...nis(run) },
+    { key: "nis", title: "Consistency of the filter: NIS", unit: "–", ...nis(run) },
     {
       key: "supervisor",
       title: run.method === "bank" ? "Bank: scale of the noise" : "Supervisor γ",
@@ -131,7 +131,7 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
       traces: one("supervisor", run.method === "bank" ? "0 smallest, 1 largest" : "γ", "orange"),
       low: 0,
       high: 1.02,
-      about: run.method === "bank" ? "Where the expected scale of the process noise stands between the bank's smallest and largest." : "How far A is let through: Q = [I + γ (A − I)] Q₀.",
+      about: run.method === "bank" ? "The expected scale of the process noise, between the bank's smallest and largest." : "How far A may act: Q = [I + γ (A − I)] Q₀.",
     },
     {
       key: "adaptation",
@@ -140,7 +140,7 @@ export function panelsOf(run: Run, wheels: string[]): Panel[] {
       traces: adaptation(run, wheels, color),
       levels: [1],
       log: [0.03, 80],
-      about: "The diagonal of A: by how much innovations ask for more (above 1) or less process noise of each state. Q = [I + γ (A − I)] Q₀.",
+      about: "The diagonal of A: the factor on the process noise of each state that the innovations call for. Q = [I + γ (A − I)] Q₀.",
     },
     { key: "load", title: "Vertical load", unit: "force", traces: run.columns.filter((c) => c.startsWith("vertical_load_")).map((column, i) => ({ column, label: column.slice(14), color: WHEEL_COLORS[i] ?? "blue", band: "", scale: 1 })) },
   ];
@@ -162,7 +162,7 @@ function nis(run: Run): Pick<Panel, "traces" | "levels" | "about" | "low" | "hig
     low: 0,
     high: 5,
     about:
-      "How large innovations are against what the filter expects of them: 1 of an honest filter, 95 % of the time in the band; above it the filter is too sure of itself.",
+      "Size of the innovations relative to what the filter expects: 1 if its intervals are right, and in the band 95 % of the time. Above the band the intervals are too narrow.",
   };
 }
 

@@ -25,7 +25,7 @@ export function described(sample: Sample, event: Event | undefined): (HTMLElemen
   return [
     h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
     sample.event ? h("p", { class: "bad" }, `${sample.event}${event?.why ? `: ${event.why}` : ""}`) : null,
-    h("h3", {}, "Why µ moved"),
+    h("h3", {}, "Why µ changed"),
     ...sample.why.map((text) => h("p", { class: "why" }, text)),
     h("h3", {}, "Estimated"),
     h("table", {}, h("tbody", {}, names.map((name) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value(name, sample.values[name], 4)), h("td", {}, spread(name)), h("td", { class: "unit" }, unitOf(name).name))))),

@@ -35,7 +35,7 @@ class Editor {
   private zoom = 1;
   private percent = true;
   private stage = h("div", { class: "stage" });
-  private canvas = h("canvas", { class: "sheet", tabindex: "0", role: "img", "aria-label": "The picture: click the marks, or type their pixels beside it" });
+  private canvas = h("canvas", { class: "sheet", tabindex: "0", role: "img", "aria-label": "Click two points on each axis, or type their pixels" });
   private side = h("div", { class: "side" });
 
   constructor(

@@ -75,14 +75,14 @@ export class CurvesPanel {
       h("div", { class: "field" }, h("label", { for: "curve-name" }, "Name"), this.nameField(curve)),
       h("div", { class: "field" }, h("label", { for: "curve-model" }, "Model"), this.modelChoice(curve)),
       h("p", { class: "source" }, model?.source ?? ""),
-      h("p", { class: "hint" }, "Ticked: held, a fit leaves it as it is. Below each slider: the ends that a fit keeps to."),
+      h("p", { class: "hint" }, "Ticked: held, a fit does not change it. Below each slider: the limits of a fit."),
       parameters.map((p) => this.row(curve, p)),
       this.interceptChoice(curve),
       h(
         "div",
         { class: "row" },
         h("button", { type: "button", class: "primary", id: "fit-button", click: () => void this.work((progress) => (progress("Fitting …"), this.actions.fit())) }, "Fit to points"),
-        h("button", { type: "button", id: "fit-each", click: () => void this.work((progress) => this.actions.each(progress)), title: "A curve for each soil that is shown, by this model, its held parameters and ends" }, "Fit each soil"),
+        h("button", { type: "button", id: "fit-each", click: () => void this.work((progress) => this.actions.each(progress)), title: "A curve for each soil that is shown, with this model, its held parameters and limits" }, "Fit each soil"),
         h("button", { type: "button", click: this.actions.save }, "Save to library"),
       ),
       h("p", { class: "hint", id: "fit-progress", role: "status" }),
@@ -195,7 +195,7 @@ export class CurvesPanel {
       this.settle();
     });
     this.rows.set(name, { slider, field, parameter });
-    const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: a fit leaves it as it is`, title: "hold: a fit leaves it as it is" });
+    const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: a fit does not change it`, title: "hold: a fit does not change it" });
     hold.addEventListener("change", () => {
       curve.held = hold.checked ? [...curve.held, name] : curve.held.filter((other) => other !== name);
       this.settle();
@@ -254,7 +254,7 @@ export class CurvesPanel {
   private apart(curve: Curve, fit: FitResult): string {
     const { samples } = this.state;
     const [mine, fitted] = [samples.of(curve.id, curve), samples.of(`fit ${curve.id}`, fit)];
-    if (!mine || !fitted || !samples.isCurrent(curve.id, curve)) return "The sliders have left this fit.";
+    if (!mine || !fitted || !samples.isCurrent(curve.id, curve)) return "Changed by hand since this fit.";
     const [slip, off] = farthest(mine, fitted);
     const unit = unitFor("share");
     const said = (share: number): string => withUnit(digits(unit.scale * share, 3), unit);
@@ -300,7 +300,7 @@ export class CurvesPanel {
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
       h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
       h("p", { class: `badge ${identified ? "good" : "poor"}` }, identified ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
-      fit.at_bound.length ? h("p", { class: "hint" }, `${fit.at_bound.map((name) => SYMBOLS[name] ?? name).join(", ")}: stopped at an end of its range, so the data do not fix it. Hold it, or fit with more slip.`) : null,
+      fit.at_bound.length ? h("p", { class: "hint" }, `${fit.at_bound.map((name) => SYMBOLS[name] ?? name).join(", ")}: at a limit of its range, so the data do not determine it. Hold it, or fit with more slip.`) : null,
       fit.notes.map((text) => h("p", { class: "hint" }, text)),
     );
   }

@@ -115,7 +115,7 @@ export class ListPanel {
   private literatureChoice(): HTMLElement {
     const choice = h(
       "select",
-      { "aria-label": "Add a curve of the literature" },
+      { "aria-label": "Add a curve from the literature" },
       h("option", { value: "" }, "Literature …"),
       this.literature.map((soil, i) => h("option", { value: i }, `${soil.name} (${soil.source.split(",")[0]})`)),
     );
@@ -132,7 +132,7 @@ export class ListPanel {
   private fileChoice(): HTMLElement {
     const choice = h(
       "select",
-      { id: "soil-file", "aria-label": "Show soils of a file" },
+      { id: "soil-file", "aria-label": "Show the soils of a file" },
       h("option", { value: "" }, this.files.length ? "Soils of a file …" : "No estimates or libraries in the folder"),
       this.files.map((item) => h("option", { value: item.path }, item.path)),
     );
@@ -143,7 +143,7 @@ export class ListPanel {
   private binChoice(): HTMLElement {
     const choice = h(
       "select",
-      { id: "bins-by", title: "By pull, as terragrip soils does: noise of slip does not move a sample into another bin. By slip: what most papers print." },
+      { id: "bins-by", title: "By pull, as terragrip soils does: noise of slip does not move a sample into another bin. By slip: as in most papers." },
       (["pull", "slip"] as const).map((by) => h("option", { value: by, selected: by === this.state.by }, by === "pull" ? "the vehicle's pull" : "slip")),
     );
     choice.addEventListener("change", () => void this.rebin(choice.value === "slip" ? "slip" : "pull"));

@@ -55,7 +55,7 @@ export function mapOf(calibration: Pick<Calibration, "slip" | "adhesion">): Pict
   const v: Pixel = [q2.pixel[0] - q1.pixel[0], q2.pixel[1] - q1.pixel[1]];
   const area = u[0] * v[1] - u[1] * v[0];
   if (Math.abs(area) < 1e-3 * Math.hypot(...u) * Math.hypot(...v) || Math.hypot(...u) < 1 || Math.hypot(...v) < 1) {
-    return "The two axes run the same way: click points that lie further apart.";
+    return "The two axes have the same direction: click points further apart.";
   }
   const forward = (axis: Axis, value: number): number => (axis.log ? Math.log(value) : value);
   const back = (axis: Axis, value: number): number => (axis.log ? Math.exp(value) : value);

@@ -140,8 +140,8 @@ export class PicturesPanel {
     const more = this.files.filter((path) => !(path in pictures));
     const choice = h(
       "select",
-      { "aria-label": "Open a picture of the folder" },
-      h("option", { value: "" }, more.length ? "Picture of the folder …" : "No pictures in the folder"),
+      { "aria-label": "Open a picture from the folder" },
+      h("option", { value: "" }, more.length ? "Picture from the folder …" : "No pictures in the folder"),
       more.map((path) => h("option", { value: path }, path)),
     );
     choice.addEventListener("change", () => void (choice.value && this.open(choice.value)));
@@ -152,7 +152,7 @@ export class PicturesPanel {
       h("h2", {}, "Background pictures"),
       Object.entries(pictures).map(([path, calibration]) => this.picture(path, calibration)),
       choice,
-      h("div", { class: "row" }, file, h("label", { for: "picture-file", class: "button" }, "Load a picture"), h("span", { class: "hint" }, "or drop, or paste")),
+      h("div", { class: "row" }, file, h("label", { for: "picture-file", class: "button" }, "Load a picture"), h("span", { class: "hint" }, "or drop or paste one")),
     );
   }
 

@@ -37,5 +37,5 @@ export function pointTable(state: State): void {
     return;
   }
   save("points.csv", csvOf([["curve", "kind", "slip [-]", "adhesion [-]", "std [-]", "count"], ...rows]));
-  if (thinned) note(`Points are thinned as on the plot;${thinned} Bins are of all.`);
+  if (thinned) note(`Points are thinned as in the plot;${thinned} Bins use all points.`);
 }

@@ -126,9 +126,9 @@ export class Alarms {
       h(
         "div",
         { class: "menu" },
-        limit("slip", "Slip over"),
-        limit("grip", "Grip over"),
-        h("label", { class: "check" }, sound, "Ring (also on warnings, and when the source falls silent)"),
+        limit("slip", "Slip above"),
+        limit("grip", "Grip above"),
+        h("label", { class: "check" }, sound, "Sound (also on warnings, and when the source stops)"),
         this.mute,
       ),
     );

@@ -75,7 +75,7 @@ export const page: Page = (main, { query }) => {
     const dead = isOld || waiting || feed.state !== "connected";
     main.classList.toggle("dead", dead && !predicted);
     main.classList.toggle("predicted", predicted);
-    const said = !feed.ring.taken ? "NO DATA YET" : predicted ? `PREDICTED ONLY, nothing measured for ${seconds(unmeasured)}` : `NO DATA for ${seconds(unmeasured)}`;
+    const said = !feed.ring.taken ? "NO DATA YET" : predicted ? `PREDICTED ONLY, no measurement for ${seconds(unmeasured)}` : `NO DATA for ${seconds(unmeasured)}`;
     age.textContent = dead || predicted ? `${said}${feed.state === "lost" ? ` (${why})` : feed.state === "ended" ? " (the run has ended)" : ""}` : `measured ${seconds(unmeasured)} ago`;
     alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }

@@ -208,7 +208,7 @@ export class Feed {
         this.set("ended");
         return;
       }
-      this.set("lost", why || "the stream stopped; trying again");
+      this.set("lost", why || "the connection was lost; trying again");
       this.timer = window.setTimeout(() => this.open(), this.pause);
       this.pause = Math.min(this.pause * 2, 8000);
     };

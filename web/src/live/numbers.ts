@@ -5,7 +5,7 @@ import { fixed, unitFor } from "../ui/units";
 import { LEAST_AGE, oldAfter, type Feed, type Hello, type Ring } from "./feed";
 
 export const WARNING: Record<string, string> = {
-  immobilization: "About to dig in",
+  immobilization: "Digging in soon",
   stuck: "Stuck",
   push: "The tool pushes",
 };
@@ -45,7 +45,7 @@ export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
       value: slips.length ? most : NaN,
       shown: [fixed(most, share), slips.length ? `${wheel}, ± ${fixed(spread, share)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
     },
-    grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; what the soil offers is not known yet`] },
+    grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; the soil's maximum is not known yet`] },
     speed: { value: v, shown: [fixed(v, pace), Number.isFinite(v) ? `± ${fixed(1.96 * ring.last("ground_speed_std"), pace)}` : "not known"] },
   };
 }
@@ -77,8 +77,8 @@ export const seconds = (age: number): string => (Number.isFinite(age) ? `${age.t
 
 export function oldSaid(predicted: boolean, age: number, ended: boolean): string {
   return predicted
-    ? `Predicted: nothing was measured for ${seconds(age)}; the filter goes on alone, with growing intervals.`
-    : `These numbers are ${seconds(age)} old${ended ? ": the run has ended" : ": no rows come"}.`;
+    ? `Predicted: no measurement for ${seconds(age)}; intervals grow until there is one.`
+    : `These numbers are ${seconds(age)} old${ended ? ": the run has ended" : ": no new rows"}.`;
 }
 
 /** What a driver can read at a glance: what happens, without the figures and the rule after it, which the list of events tells. */

@@ -56,17 +56,17 @@ export const page: Page = (main, { notices, query }) => {
   const traces = new Traces(feed.ring, () => feed.hello?.events ?? []);
   const alarms = new Alarms();
   const setpoint = new SetpointLine();
-  const span = h("select", { id: "live-span", "aria-label": "Time shown" }, SPANS.map((x) => h("option", { value: x, selected: x === traces.span }, x < 60 ? `${x} s` : `${x / 60} min`)));
+  const span = h("select", { id: "live-span", "aria-label": "Time range" }, SPANS.map((x) => h("option", { value: x, selected: x === traces.span }, x < 60 ? `${x} s` : `${x / 60} min`)));
   span.addEventListener("change", () => {
     traces.span = Number(span.value);
     traces.lookBack(traces.back);
   });
-  const seek = h("input", { type: "range", id: "seek", step: "any", "aria-label": "Place in the replay", hidden: true });
+  const seek = h("input", { type: "range", id: "seek", step: "any", "aria-label": "Position in the replay", hidden: true });
   seek.addEventListener("change", () => {
     begin = Number(seek.value);
     feed.again();
   });
-  const past = h("input", { type: "range", id: "live-back", step: "any", "aria-label": "Look back while it records" });
+  const past = h("input", { type: "range", id: "live-back", step: "any", "aria-label": "Look back while recording" });
   past.addEventListener("input", () => traces.lookBack(Number(past.value)));
   const follow = h("button", { type: "button", id: "follow", hidden: true, click: () => traces.lookBack(null) }, "Now");
   const place = h("output", { class: "hint" });
@@ -93,7 +93,7 @@ export const page: Page = (main, { notices, query }) => {
     past.value = String(traces.back ?? ring.now);
     past.disabled = ring.now - ring.oldest <= traces.span;
     follow.hidden = traces.back === null;
-    place.value = traces.back === null ? "" : `looking back ${(ring.now - traces.back).toFixed(0)} s; the numbers above are of now`;
+    place.value = traces.back === null ? "" : `looking back ${(ring.now - traces.back).toFixed(0)} s; the numbers above are current`;
     if (feed.hello?.replay && document.activeElement !== seek) seek.value = String(ring.now);
   }
 
@@ -212,7 +212,7 @@ export const page: Page = (main, { notices, query }) => {
       live?.service || !runs.length ? h("option", { value: "" }, live?.service ? "live service" : "no live service, no runs") : null,
       runs.map((path) => h("option", { value: path }, `replay ${path}`)),
     );
-    if (before && !runs.includes(before)) source.prepend(h("option", { value: before }, `replay ${before} (not to be had)`));
+    if (before && !runs.includes(before)) source.prepend(h("option", { value: before }, `replay ${before} (not available)`));
     source.value = before;
     speed.hidden = source.value === "";
     if (first) {

@@ -25,9 +25,9 @@ export function corners(name: string, bounds: Bounds, before: Corners | null = n
       "form",
       { method: "dialog" },
       h("h2", { id: "edges" }, `Edges of ${name}`),
-      h("p", { class: "hint" }, "This picture does not say where it lies. Give its edges in degrees (WGS 84)."),
+      h("p", { class: "hint" }, "This picture has no position. Enter its edges in degrees (WGS 84)."),
       Object.entries(fields).map(([label, input]) => h("div", { class: "field" }, h("label", { for: input.id }, label), input)),
-      h("div", { class: "row end" }, h("button", { type: "button", click: () => end(null) }, "Cancel"), h("button", { type: "submit", class: "primary" }, "Lay it down")),
+      h("div", { class: "row end" }, h("button", { type: "button", click: () => end(null) }, "Cancel"), h("button", { type: "submit", class: "primary" }, "Place it")),
     );
     const end = (found: Corners | null): void => {
       dialog.close();

@@ -8,7 +8,7 @@ export function noPositions(recording: string | null): HTMLElement {
   return h(
     "div",
     { class: "map-empty", id: "map-empty" },
-    h("h2", {}, "This run has no positions, so there is no place to draw it at"),
-    h("ul", {}, h("li", {}, "The log holds them under other names: choose its columns for latitude and longitude on ", columns, ", and estimate it anew."), h("li", {}, "A receiver wrote them to a file of its own (NMEA, CSV): give both files to ", h("code", {}, "terragrip estimate"), " (", h("code", {}, "--with"), ")."), h("li", {}, "Nothing recorded them: let a GNSS receiver run beside the next drive; once a second is enough.")),
+    h("h2", {}, "This run has no positions, so it cannot be drawn on a map"),
+    h("ul", {}, h("li", {}, "If the log has them under other names: choose its columns for latitude and longitude on ", columns, ", and estimate it again."), h("li", {}, "If a receiver wrote them to its own file (NMEA, CSV): give both files to ", h("code", {}, "terragrip estimate"), " (", h("code", {}, "--with"), ")."), h("li", {}, "If nothing recorded them: log a GNSS receiver on the next drive; once a second is enough.")),
   );
 }

@@ -37,7 +37,7 @@ export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
   const readout = h("output", { class: "line" });
   main.append(
-    h("div", { class: "tools" }, choice, quantity, h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, doubt, "fade what is uncertain"), under.choice, under.edges, h("span", { class: "spring" }), making.button, saveMenu(() => `map-${path.replace(/\.parquet$/, "")}-${quantity.value}`, sheet, table), h("button", { type: "button", click: () => frame() }, "Whole track")),
+    h("div", { class: "tools" }, choice, quantity, h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, doubt, "fade uncertain values"), under.choice, under.edges, h("span", { class: "spring" }), making.button, saveMenu(() => `map-${path.replace(/\.parquet$/, "")}-${quantity.value}`, sheet, table), h("button", { type: "button", click: () => frame() }, "Whole track")),
     making.element,
     legend,
     box,
@@ -307,7 +307,7 @@ export const page: Page = (main, { notices, query }) => {
     if (!wanted) charts.clear("Nothing to show yet: open a recording on the folder page and estimate it.");
     else if (!now) leave(wanted, path && run ? `${wanted} was removed from the folder. Choose another run.` : notHere(wanted));
     else if (now !== seen || !run) {
-      if (run && seen) note(`${wanted} was replaced: shown anew`);
+      if (run && seen) note(`${wanted} was replaced: reloaded`);
       seen = now;
       await open(wanted);
     }

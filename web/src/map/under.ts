@@ -21,7 +21,7 @@ export class UnderMap {
   /** Which picture lies below. */
   readonly choice = h("select", { "aria-label": "Basemap" });
   /** Gives a picture that does not know its place other edges. */
-  readonly edges = h("button", { type: "button", id: "map-edges", hidden: true, click: () => void this.replaceEdges(), title: "Give the picture other edges" }, "Edges");
+  readonly edges = h("button", { type: "button", id: "map-edges", hidden: true, click: () => void this.replaceEdges(), title: "Change the edges of the picture" }, "Edges");
   private forget: () => void;
 
   /** `above`: the layer that the picture lies under; `keyboard`: the arrow keys move the map. */

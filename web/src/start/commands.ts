@@ -18,12 +18,12 @@ interface Command {
 }
 
 const COMMANDS: Record<string, Command> = {
-  batch: { kind: "batch", title: "Estimate", files: "recordings", asks: ["vehicle", "profile", "smooth"], ending: "", about: "The estimates of each log, all into one folder; one that cannot be read does not stop the others." },
-  calibrate: { kind: "calibrate", title: "Calibrate a vehicle", files: "recordings", asks: ["vehicle", "profile"], ending: ".yaml", about: "Zeros from standstill, radii from straight passes without load, torque gains from the wheels against each other." },
+  batch: { kind: "batch", title: "Estimate", files: "recordings", asks: ["vehicle", "profile", "smooth"], ending: "", about: "Estimates of each log, in one folder; a log that cannot be read does not stop the others." },
+  calibrate: { kind: "calibrate", title: "Calibrate a vehicle", files: "recordings", asks: ["vehicle", "profile"], ending: ".yaml", about: "Zeros from standstill, radii from straight passes without load, torque gains by comparing the wheels." },
   soils: { kind: "soils", title: "Learn soils", files: "estimates", asks: ["soil"], ending: ".json", about: "The adhesion curve of each soil that the logs name, with its interval." },
-  ground: { kind: "ground", title: "Find changes of the ground", files: "estimates", asks: ["library"], ending: ".json", about: "Where the ground changes, which soil it is, and what happened on it." },
-  map: { kind: "map", title: "Map the ground", files: "estimates", asks: ["cell", "slip", "datum", "library", "ground"], ending: ".gpkg", about: "Cells of adhesion, soil resistance, slip and efficiency with their standard deviations; what changed between passes and runs, patches unlike their surroundings. Runs in the order of their days." },
-  report: { kind: "report", title: "Write a report", files: "estimates", asks: ["title", "library", "ground"], ending: ".html", about: "A page with figures and tables, and a PDF beside it." },
+  ground: { kind: "ground", title: "Find changes of the ground", files: "estimates", asks: ["library"], ending: ".json", about: "Where the ground changes, which soil it is, and the events on it." },
+  map: { kind: "map", title: "Map the ground", files: "estimates", asks: ["cell", "slip", "datum", "library", "ground"], ending: ".gpkg", about: "Cells of adhesion, soil resistance, slip and efficiency with their standard deviations; what changed between passes and runs, patches that differ from their surroundings. Runs are ordered by date." },
+  report: { kind: "report", title: "Write a report", files: "estimates", asks: ["title", "library", "ground"], ending: ".html", about: "A page with figures and tables, and the same as PDF." },
 };
 
 /** The commands that files of a kind can be given to. */
@@ -57,11 +57,11 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
     return row(NAMES[kind], field);
   };
   const forms: Record<Ask, () => HTMLElement> = {
-    cell: () => number("cell", { min: "0.05", max: "1000", step: "any" }, "by the machine: 1 m, above a tonne 3 m"),
-    slip: () => number("slip", { min: "2", max: "90", step: "any" }, "20: the slip that adhesion is given at"),
+    cell: () => number("cell", { min: "0.05", max: "1000", step: "any" }, "by the machine's mass: 1 m, above a tonne 3 m"),
+    slip: () => number("slip", { min: "2", max: "90", step: "any" }, "20: the slip at which adhesion is given"),
     datum: () => text("datum", "", "EPSG:4326 (WGS 84), what GNSS receivers give"),
     vehicle: () => select("vehicle", of("vehicle").length > 1 ? "choose one" : ""),
-    profile: () => select("profile", "none: the columns have our names"),
+    profile: () => select("profile", "none: the columns have Terragrip's names"),
     library: () => select("library", NO_SOILS[command.kind] ?? "none: soils are not named"),
     ground: () => select("ground", "none"),
     soil: () => text("soil", "", "as the logs' labels say"),
@@ -105,7 +105,7 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
 }
 
 const NAMES: Record<Ask, string> = { vehicle: "Vehicle", profile: "Profile", library: "Soils", ground: "Ground", soil: "One soil", title: "Title", smooth: "", cell: "Cell [m]", slip: "Slip [%]", datum: "Datum" };
-const NO_SOILS: Record<string, string> = { report: "none: curves are learned from these runs", map: "none: adhesion is carried to that slip by the paper's curve" };
+const NO_SOILS: Record<string, string> = { report: "none: curves are learned from these runs", map: "none: adhesion is converted to that slip by the paper's curve" };
 
 function proposed(command: Command, files: string[]): string {
   const one = files.length === 1 ? `${stemOf(files[0] as string).replace(/-estimates$/, "")}-` : "";

@@ -109,7 +109,7 @@ export class LogPage {
       fill(this.columns, this.mapping?.element ?? null);
       return;
     }
-    const none = this.look.ready ? "no profile: the columns have our names" : "no profile yet: choose the columns below";
+    const none = this.look.ready ? "no profile: the columns have Terragrip's names" : "no profile yet: choose the columns below";
     const profile = choice("wizard-profile", [...new Set([...this.of("profile"), ...this.look.fitting])], this.profile, none);
     profile.addEventListener("change", () => {
       this.profile = profile.value;
@@ -142,7 +142,7 @@ export class LogPage {
     maker.element.addEventListener("kept", (event) => fill(command, h("details", {}, h("summary", {}, "Command line that makes this vehicle file"), (event as CustomEvent<HTMLElement>).detail)));
     refill(this.machine, [
       row("Vehicle", select),
-      h("details", { open: !vehicles.length, id: "make-machine" }, h("summary", {}, "Make a vehicle file from what you know"), maker.element),
+      h("details", { open: !vehicles.length, id: "make-machine" }, h("summary", {}, "Make a vehicle file from known numbers"), maker.element),
       command,
     ]);
   }
@@ -212,7 +212,7 @@ export class LogPage {
         h("p", { class: ready ? "good" : "bad" }, this.verdict(result)),
         ready ? null : this.namesMissing(),
         result.warnings.map((text) => h("p", { class: "hint" }, text)),
-        h("details", {}, h("summary", {}, "What is in it"), h("pre", { tabindex: "0" }, result.text)),
+        h("details", {}, h("summary", {}, "Contents"), h("pre", { tabindex: "0" }, result.text)),
       );
       go.disabled = !ready;
       this.drawNext();
@@ -229,7 +229,7 @@ export class LogPage {
       (document.getElementById("choose-columns") as HTMLDetailsElement).open = true;
       this.mapping?.names.focus(first);
     };
-    return h("p", {}, h("button", { type: "button", id: "name-wheels", click: go }, "Say which wheel is which"));
+    return h("p", {}, h("button", { type: "button", id: "name-wheels", click: go }, "Assign the wheels"));
   }
 
   private verdict(found: Inspection): string {
@@ -247,11 +247,11 @@ export class LogPage {
   /** What follows from the estimates; until there are any, what would. */
   private drawNext(): void {
     if (!this.estimates) {
-      fill(this.next, h("p", { class: "hint" }, "Once there are estimates: the drive on a page, the adhesion curve of the ground, where the ground changes, and a report."));
+      fill(this.next, h("p", { class: "hint" }, "After estimating: the drive on a page, the adhesion curve of the ground, where the ground changes, and a report."));
       return;
     }
     const old = document.getElementById("next-soil") as HTMLInputElement | null;
-    const soil = h("input", { type: "text", id: "next-soil", value: old?.value ?? (this.hasLabels ? "" : "field"), placeholder: this.hasLabels ? "as the log's labels say" : "" });
+    const soil = h("input", { type: "text", id: "next-soil", value: old?.value ?? (this.hasLabels ? "" : "field"), placeholder: this.hasLabels ? "as labelled in the log" : "" });
     const stem = stemOf(this.log);
     const library = this.made.get("soils") ?? null;
     const ground = this.made.get("ground") ?? null;
@@ -266,7 +266,7 @@ export class LogPage {
       h("ul", { class: "next" },
         h("li", {}, h("a", { href: viewOf("estimates", this.estimates), id: "see-estimate" }, `See the drive: ${this.estimates}`)),
         button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, freeName(this.items, `${stem}-soils`, ".json"))),
-        h("li", { class: "of" }, h("label", { for: soil.id }, "of the ground named"), soil),
+        h("li", { class: "of" }, h("label", { for: soil.id }, "for the ground named"), soil),
         button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, freeName(this.items, `${stem}-ground`, ".json"))),
         button("report", "Write the report", () => void this.queue("report", { ...runs, library, ground }, freeName(this.items, `${stem}-report`, ".html"))),
       ),

@@ -65,7 +65,7 @@ export class MachineMaker {
       this.element,
       h("div", { class: "maker-head" }, row("Machine", this.kind), row("Its log measures", this.signals), row("Name", this.name)),
       h("div", { class: "maker-body" }, h("div", {}, this.form, this.problem), h("div", {}, this.picture, this.costs)),
-      h("div", { class: "row end" }, h("label", { for: this.output.id }, "Keep as"), this.output, this.save),
+      h("div", { class: "row end" }, h("label", { for: this.output.id }, "Save as"), this.output, this.save),
     );
     this.kind.addEventListener("change", () => void this.look());
     this.signals.addEventListener("change", () => void this.look());
@@ -138,10 +138,10 @@ export class MachineMaker {
     const sensors = fields.filter((field) => field.is_spread);
     fill(
       this.form,
-      fields.length ? h("p", { class: "hint" }, "With its unit (6.2 t, 83 cm). Left empty: typical of the class, and its doubt widens the intervals.") : h("p", { class: "hint" }, "No number of the machine is needed: the log itself gives the zero of slip."),
+      fields.length ? h("p", { class: "hint" }, "With its unit (6.2 t, 83 cm). Left empty: typical of the class, and its uncertainty widens the intervals.") : h("p", { class: "hint" }, "No number of the machine is needed: the log itself gives the zero of slip."),
       first.map(asked),
       others.map(asked),
-      sensors.length ? h("details", {}, h("summary", {}, "How good its sensors are"), sensors.map(asked)) : null,
+      sensors.length ? h("details", {}, h("summary", {}, "Noise of its sensors"), sensors.map(asked)) : null,
     );
   }
 
@@ -169,8 +169,8 @@ export class MachineMaker {
     const small = costs.filter((cost) => !rows.includes(cost)).map((cost) => fields.find((field) => field.name === cost.field)?.title ?? cost.field);
     fill(
       this.costs,
-      h("h3", {}, "What each missing number costs"),
-      h("p", { class: "hint" }, "Half the 95 % interval. Computed, not measured: this machine at work on paper, each doubt alone through the filter."),
+      h("h3", {}, "Effect of each missing number"),
+      h("p", { class: "hint" }, "Half the 95 % interval. Computed, not measured: this machine at work in simulation, each uncertainty alone through the filter."),
       h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": "Costs" }, h("table", { class: "numbers" }, h("thead", {}, h("tr", {}, h("th", {}, ""), shown.map(([, text]) => h("th", { scope: "col" }, `± ${text}`)))), h("tbody", {}, rows.map((cost) => h("tr", { class: cost.field ? null : "whole" }, h("th", { scope: "row" }, title(cost)), shown.map(([name]) => h("td", {}, (cost.half_width[name] ?? NaN).toFixed(3)))))))),
       small.length ? h("p", { class: "hint" }, `Of little effect: ${small.join("; ")}.`) : null,
     );

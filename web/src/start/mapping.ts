@@ -72,7 +72,7 @@ export class Mapping {
 
   /** Look into the log; `output` is the profile to write. */
   async open(output: string): Promise<Look | undefined> {
-    fill(this.element, h("p", { class: "hint" }, "Looking into the log …"));
+    fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
     try {
       this.look = await get<Look>("columns", { path: this.log });
     } catch (error) {
@@ -131,12 +131,12 @@ export class Mapping {
     fill(
       this.element,
       look.refused ? h("p", { class: "bad" }, `This log ${look.refused}.`) : null,
-      h("p", { class: "hint" }, "Which column is what. The likeliest is chosen; its reason stands beside it, and “?” is a doubt to look at."),
+      h("p", { class: "hint" }, "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
       this.names.element,
       this.timeRow(look),
       h("div", { class: "map-rows", role: "group", "aria-label": "Channels" }, needed.map((channel) => this.row(channel))),
-      h("details", {}, h("summary", {}, `${other.length} more channels that help, where the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
-      h("div", { class: "row" }, h("label", { for: name.id }, "Keep as"), name, use),
+      h("details", {}, h("summary", {}, `${other.length} more channels that help, if the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
+      h("div", { class: "row" }, h("label", { for: name.id }, "Save as"), name, use),
     );
   }
 
@@ -207,7 +207,7 @@ export class Mapping {
 
   private sign(channel: Channel, choice: Choice): HTMLElement {
     const turned = choice.entry.sign === -1;
-    const button = h("button", { type: "button", class: "sign", "aria-pressed": String(turned), "aria-label": `Turn the sign of ${channel.name}`, title: "Turn the sign" }, turned ? "−" : "+");
+    const button = h("button", { type: "button", class: "sign", "aria-pressed": String(turned), "aria-label": `Change the sign of ${channel.name}`, title: "Change the sign" }, turned ? "−" : "+");
     button.addEventListener("click", () => {
       if (choice.entry.sign === -1) delete choice.entry.sign;
       else choice.entry.sign = -1;
@@ -232,7 +232,7 @@ export class Mapping {
   private async save(output: string): Promise<void> {
     const twice = this.names.twice();
     if (twice) {
-      note(`${twice.join(" and ")} have been given one name: ${this.names.nameOf(twice[0])}. Each is another wheel or axle.`, "error");
+      note(`${twice.join(" and ")} have the same name: ${this.names.nameOf(twice[0])}. Each must be a different wheel or axle.`, "error");
       this.names.focus(twice[1]);
       return;
     }

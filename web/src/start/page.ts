@@ -20,7 +20,7 @@ const KINDS: [string, string, string][] = [
   ["map", "Maps", "None yet: make one from estimates of a drive with positions."],
   ["report", "Reports", "None yet: write one from estimates."],
   ["vehicle", "Vehicles", "None yet: an estimate needs one."],
-  ["profile", "Profiles", "Only needed for logs with names of their own; choosing a log's columns makes one."],
+  ["profile", "Profiles", "Only needed for logs with other column names; choosing a log's columns makes one."],
   ["picture", "Pictures", "Scans of printed curves, for the fit page."],
 ];
 
@@ -39,7 +39,7 @@ function openLog(main: HTMLElement, context: Context, log: string): () => void {
 /** The vehicle maker on a page of its own, without a log. */
 function openMaker(main: HTMLElement): void {
   const body = h("div");
-  main.append(h("p", { class: "back" }, h("a", { href: "#/start" }, "← Folder")), h("h1", {}, "A vehicle file from what you know"), body);
+  main.append(h("p", { class: "back" }, h("a", { href: "#/start" }, "← Folder")), h("h1", {}, "A vehicle file from known numbers"), body);
   void tried(async () => {
     const { items } = await get<{ items: Item[] }>("folder");
     const maker = new MachineMaker(freeName(items, "vehicle", ".yaml"), "torque", (path) => note(`${path} saved`));

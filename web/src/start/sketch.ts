@@ -32,7 +32,7 @@ const TALL = 150; // what a machine may be high
 export function sketch(vehicle: Vehicle, known: Set<string>): HTMLElement {
   const axles = Object.values(vehicle.axles);
   const side = axles.every((axle) => axle.wheel ?? vehicle.wheel);
-  return h("figure", { class: "sketch" }, side ? sideView(vehicle, known) : null, side && vehicle.track ? topView(vehicle, known) : null, h("figcaption", { class: "hint" }, side ? "To scale. Dashed: typical of the class, not yet known." : "Of a bus speed no number of the machine counts."));
+  return h("figure", { class: "sketch" }, side ? sideView(vehicle, known) : null, side && vehicle.track ? topView(vehicle, known) : null, h("figcaption", { class: "hint" }, side ? "To scale. Dashed: typical of the class, not given yet." : "With a bus speed no dimension of the machine matters."));
 }
 
 /** Rear to the left, front to the right, ground below. */

@@ -82,7 +82,7 @@ export class WheelNames {
   private draw(): void {
     const groups = [false, true].flatMap((axle) => this.list(axle).map((wheel) => this.field(wheel, axle ? this.parts.axles : this.parts.wheels)));
     const odd = this.strangers(() => true).length > 0;
-    fill(this.element, groups.length ? h("details", { open: odd }, h("summary", {}, "Which wheel is which"), h("p", { class: "hint" }, "The log’s wheels and axles, by the names of the vehicle file."), h("div", { class: "row" }, groups)) : null);
+    fill(this.element, groups.length ? h("details", { open: odd }, h("summary", {}, "Assign the wheels"), h("p", { class: "hint" }, "The log’s wheels and axles, by the names of the vehicle file."), h("div", { class: "row" }, groups)) : null);
   }
 
   private field(wheel: string, known: string[]): HTMLElement {

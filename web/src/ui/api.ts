@@ -36,7 +36,7 @@ export async function request(path: string, query: Query = {}, options: RequestI
     answer = await fetch(more ? `${plain}${plain.includes("?") ? "&" : "?"}${more}` : plain, options);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new Error("The studio does not answer; is it still running?");
+    throw new Error("The studio does not respond; is it still running?");
   }
   if (!answer.ok) throw new Error(await reason(answer));
   return answer;
@@ -67,7 +67,7 @@ export function upload(path: string, content: Blob, replace: boolean, progress: 
     const call = new XMLHttpRequest();
     call.open("PUT", address("file", { path, replace }));
     call.upload.onprogress = (event) => event.lengthComputable && progress(event.loaded / event.total);
-    call.onerror = () => reject(new Error("The studio does not answer; is it still running?"));
+    call.onerror = () => reject(new Error("The studio does not respond; is it still running?"));
     call.onload = () => {
       let said: { detail?: string } = {};
       try {

@@ -11,12 +11,12 @@ export function runsOf(items: Item[]): Map<string, string> {
 /** The options of a run's choice; one that is asked for and not there stands first, so that the choice never names another run. */
 export function options(runs: Map<string, string>, chosen: string): HTMLElement[] {
   const names = [...runs.keys()];
-  const missing = chosen && !runs.has(chosen) ? [h("option", { value: chosen, selected: true }, `${chosen} (not to be had)`)] : [];
+  const missing = chosen && !runs.has(chosen) ? [h("option", { value: chosen, selected: true }, `${chosen} (not available)`)] : [];
   if (!names.length && !missing.length) return [h("option", { value: "" }, "No estimates in the folder")];
   return [...missing, ...names.map((name) => h("option", { value: name, selected: name === chosen }, name))];
 }
 
 /** What is said in place of a run that a link names and the folder does not hold as estimates. */
 export function notHere(path: string): string {
-  return `${path} holds no estimates that can be read, or is not in this folder. Choose another run.`;
+  return `${path} contains no estimates that can be read, or is not in this folder. Choose another run.`;
 }

@@ -23,7 +23,7 @@ export function svgOf({ width, height, draw }: Sheet): string {
 export function pngOf({ width, height, draw }: Sheet): Promise<Blob> {
   const canvas = h("canvas", { width: SHARP * width, height: SHARP * height });
   const pen = canvas.getContext("2d");
-  if (!pen) throw new Error("This browser gave no canvas of that size; show fewer panels.");
+  if (!pen) throw new Error("The browser could not make a canvas of that size; show fewer panels.");
   pen.scale(SHARP, SHARP);
   pen.fillStyle = color("paper");
   pen.fillRect(0, 0, width, height);

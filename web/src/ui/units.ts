@@ -120,7 +120,7 @@ export function unitsChooser(): HTMLElement {
         field.addEventListener("change", () => choose(kind, field.value));
         return h("label", { class: "field" }, title, field);
       }),
-      h("p", { class: "hint" }, "For all pages, kept in this browser. Files stay in the units that they name."),
+      h("p", { class: "hint" }, "For all pages, stored in this browser. Files keep the units that they name."),
     );
   const element = h("details", { class: "chooser", id: "units" }, h("summary", {}, "Units"), menu);
   element.addEventListener("toggle", () => element.open && draw());

@@ -44,7 +44,7 @@ export const page: Page = (main, { notices, query }) => {
   const fade = h("input", { type: "checkbox", id: "field-fade", checked: true });
   const showWay = h("input", { type: "checkbox", id: "field-way" });
   const legend = h("div", { class: "legend-row chips" });
-  const panel = h("aside", { class: "panel", "aria-label": "What the map says", id: "field-panel" });
+  const panel = h("aside", { class: "panel", "aria-label": "Results of the map", id: "field-panel" });
   const readout = h("output", { class: "line" });
   const under = new UnderMap("", false);
   const { map, box } = under;
@@ -55,11 +55,11 @@ export const page: Page = (main, { notices, query }) => {
       { class: "tools" },
       choice, quantity, layer, area,
       h("label", { class: "check", title: "The wider the 95 % interval, the paler" }, fade, "fade uncertain"),
-      h("label", { class: "check", title: "Where the machine drove" }, showWay, "way"),
+      h("label", { class: "check", title: "The machine's track" }, showWay, "way"),
       under.choice, under.edges,
       h("span", { class: "spring" }),
       saveMenu(() => `${path.replace(/\.gpkg$/i, "")}-${quantity.value}-${layer.value}`, sheet, table),
-      h("button", { type: "button", click: () => frame(), title: "Show all of it" }, "All"),
+      h("button", { type: "button", click: () => frame(), title: "Show the whole map" }, "All"),
     ),
     legend,
     h("div", { class: "field-map" }, box, panel),
@@ -88,7 +88,7 @@ export const page: Page = (main, { notices, query }) => {
 
   async function open(): Promise<void> {
     const found = await tried(() => fieldOf(path));
-    if (!found) return leave(`${path} is no map that can be read, or is not in this folder. Choose another.`);
+    if (!found) return leave(`${path} cannot be read as a map, or is not in this folder. Choose another.`);
     box.querySelector(".map-empty")?.remove();
     opened = found;
     bare(false);
@@ -238,7 +238,7 @@ export const page: Page = (main, { notices, query }) => {
       const found = await tried(() => columns("map/way", { path, version: field.version }, []));
       if (!found || opened !== field) return;
       way = linesOf(found.data as [Float64Array, Float64Array]);
-      if (found.of && found.of > found.count) note(`The way is thinned to ${found.count} of ${found.of} points.`);
+      if (found.of && found.of > found.count) note(`The track is thinned to ${found.count} of ${found.of} points.`);
     }
     draw();
   }
@@ -312,9 +312,9 @@ export const page: Page = (main, { notices, query }) => {
     const now = maps.get(path) ?? "";
     fill(choice, listed(folder.items, path));
     under.offer(folder.items);
-    if (!now) leave(path ? (opened ? `${path} was removed from the folder. Choose another.` : `${path} is no map that can be read, or is not in this folder. Choose another.`) : "There is no map in this folder yet");
+    if (!now) leave(path ? (opened ? `${path} was removed from the folder. Choose another.` : `${path} cannot be read as a map, or is not in this folder. Choose another.`) : "There is no map in this folder yet");
     else if (now !== seen || !opened) {
-      if (opened && seen) note(`${path} was replaced: shown anew`);
+      if (opened && seen) note(`${path} was replaced: reloaded`);
       seen = now;
       await open();
     }

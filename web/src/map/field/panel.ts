@@ -36,7 +36,7 @@ function changes({ changes: all }: Mapped): HTMLElement {
 
 function anomalies({ name }: Mapped, found: Anomaly[], go: (anomaly: Anomaly) => void): HTMLElement {
   const unit = unitOf(name);
-  const none = found.length || SEARCHED.includes(name) ? "No patch is unlike its surroundings." : "Looked for in adhesion and soil resistance, which are the ground's own.";
+  const none = found.length || SEARCHED.includes(name) ? "No patch differs from its surroundings." : "Searched in adhesion and soil resistance, which belong to the ground.";
   const line = (one: Anomaly, i: number): HTMLElement =>
     h(
       "li",
@@ -53,8 +53,8 @@ function about(field: Field, job: Job | undefined): HTMLElement {
     "details",
     { class: "about-map" },
     h("summary", {}, h("h2", {}, `About this map${field.notes.length ? ` (${field.notes.length} ${field.notes.length === 1 ? "note" : "notes"})` : ""}`)),
-    h("p", {}, `Of ${runs}. Cells of ${digits(field.cell)} m, ${field.cells} in all, EPSG:${field.epsg}; positions were read in ${field.datum}.`),
+    h("p", {}, `Of ${runs}. Cells of ${digits(field.cell)} m, ${field.cells} in all, EPSG:${field.epsg}; positions in ${field.datum}.`),
     field.notes.length ? h("ul", {}, field.notes.map((note) => h("li", {}, note))) : null,
-    job ? [h("p", { class: "hint" }, "The command line that makes it:"), commandLine(job.command)] : null,
+    job ? [h("p", { class: "hint" }, "Command line that makes it:"), commandLine(job.command)] : null,
   );
 }
