@@ -1,6 +1,6 @@
 /* Terragrip kernel: traction estimation for wheeled machines. C99, no allocation, no globals, no I/O.
  *
- * Two floors. The filter floor (tg_filter_*) is the Kalman filter of physics.md 1 and 6 for one machine. The estimator floor
+ * Two layers. The filter (tg_filter_*) is the Kalman filter of physics.md 1 and 6 for one machine. The estimator
  * (tg_estimator_*) takes raw samples with missing channels and gives traction estimates: it adds vertical loads, input
  * noise, standstill, gaps, soft outlier weighting and the considered constants. Both are plain data, of a size that depends on the policy
  * (tg_filter_size, tg_estimator_size): storage need be no larger, and a copy of that many bytes is a clone.
@@ -63,7 +63,7 @@ typedef struct { /* constants of the machine */
     tg_real mass;                   /* kg */
     tg_real gravity;                /* m/s^2 */
     tg_real tire_rolling_resistance; /* rho_t */
-    tg_real radius[8];              /* m, torque arm = rolling unless the estimator floor says otherwise */
+    tg_real radius[8];              /* m, torque arm = rolling unless the estimator sets another */
     tg_real inertia[8];             /* kg m^2 */
     tg_real bearing_resistance[8];  /* rho_w, N s/rad: torque r rho_w omega */
 } tg_machine;
@@ -96,7 +96,7 @@ typedef struct {
 } tg_tuning;
 
 typedef struct { /* what one update did; arrays in channel or state order, unused places 0 */
-    int32_t channels;        /* how many channels were taken */
+    int32_t channels;        /* how many channels were used */
     tg_real nis;             /* normalised innovation squared, with the weighted R, less what neighbouring steps share */
     tg_real log_likelihood;
     tg_real innovation[10];  /* NaN where the channel was missing */
@@ -116,12 +116,12 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                          const tg_real *y, const tg_real *r, tg_step *out);
 /* The same where an input's error counts whole, as it adds up over many steps, though neighbouring steps share part of it: `shared`,
- * variances of (omega, v), n + 1 values, is what one step has less. NIS is taken without it, estimate and likelihood are not. It is part
+ * variances of (omega, v), n + 1 values, is what one step has less. NIS leaves it out, estimate and likelihood do not. It is part
  * of what this step, and the predictions since the last one, added to the variances; null: none. */
 tg_status tg_filter_step_shared(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                                 const tg_real *shared, const tg_real *y, const tg_real *r, tg_step *out);
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input);
-/* Keep the marginal of (mu, rho_s), add `walk_time` seconds of their random walk, and start (omega, v) anew at `outputs`
+/* Keep the marginal of (mu, rho_s), add `walk_time` seconds of their random walk, and restart (omega, v) at `outputs`
  * (n+1 values) with variances `variances`, uncorrelated: standstill (walk_time 0), a long gap, a change of direction. */
 tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outputs, const tg_real *variances);
 /* Mean (nx) and covariance (nx*nx); of the bank: the mixture's. Either pointer may be null. */
@@ -133,7 +133,7 @@ tg_status tg_filter_sensitivity(const tg_filter *f, int32_t j, tg_real *dx, tg_r
  * the bank's, 0..3, else 0. Exact where P itself, in single precision, may round to an indefinite matrix. */
 tg_status tg_filter_factors(const tg_filter *f, int32_t mode, tg_real *U, tg_real *D);
 
-/* Considered constants (Schmidt-Kalman): constants that the data cannot tell, each with a spread. A column is d x / d p times one SD of
+/* Considered constants (Schmidt-Kalman): constants that the data cannot determine, each with a spread. A column is d x / d p times one SD of
  * p. The reported covariance is P + sum of column column'. The columns pass through the very gains of the filter. */
 typedef struct { /* what one SD of each constant adds to what the filter computes, over one step: place k of column k, 0 beyond the last */
     tg_real wheel_acceleration[8][16]; /* wheel, rad/s^2, to d omega_i/dt */
@@ -148,7 +148,7 @@ tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviatio
 tg_status tg_consider_columns(const tg_consider *c, tg_real *s); /* columns by nx, state order */
 
 /* Smoother (Rauch-Tung-Striebel). Forwards: after every tg_filter_step, _predict and _restart call tg_track_step; once a row, after at
- * most one step that took a channel, tg_record_take writes a record of tg_record_length reals and starts the next track. Backwards:
+ * most one step with an update, tg_record_take writes a record of tg_record_length reals and starts the next track. Backwards:
  * tg_record_moments at the last row, then tg_smooth_step row by row; x, P and s hold `next` when called and `here` on return. */
 typedef struct tg_track tg_track;
 size_t tg_track_size(void);
@@ -177,11 +177,11 @@ typedef struct {
 } tg_pair;
 tg_curve tg_curve_unknown(void); /* also: a new ground */
 /* `pairs` of one instant, weighted by `share` (> 0; load), dt s and `distance` m after the last. A pair with a NaN or a slip above 60 %
- * teaches nothing, nor do pairs whose mean is below g(5 %); residuals that one ground does not make start a anew. */
+ * teaches nothing, nor do pairs whose mean is below g(5 %); residuals too large for one ground restart a. */
 tg_status tg_curve_update(tg_curve *c, tg_real dt, tg_real distance, int32_t pairs, const tg_pair *pair, const tg_real *share);
 tg_real tg_curve_std(const tg_curve *c); /* of a, random and constant errors */
 
-/* ---- Estimator floor: one raw sample in, one row of estimates out. A whole recording is its samples, one after another. ---- */
+/* ---- Estimator: one raw sample in, one row of estimates out. A whole recording is its samples, one after another. ---- */
 
 /* Places of a sample's channels. Wheels and axles in the vehicle's order, front to rear, left to right. */
 enum {
@@ -206,8 +206,8 @@ enum {
     TG_OUT_GROUND_SPEED_STD = 1,
     TG_OUT_SOIL_RESISTANCE = 2,
     TG_OUT_SOIL_RESISTANCE_STD = 3,
-    TG_OUT_NIS = 4,          /* of the channels taken; 0 where none was */
-    TG_OUT_CHANNELS = 5,     /* how many channels were taken: the expectation of NIS */
+    TG_OUT_NIS = 4,          /* of the channels used; 0 where none was */
+    TG_OUT_CHANNELS = 5,     /* how many channels were used: the expectation of NIS */
     TG_OUT_SUPERVISOR = 6,   /* gamma; of the bank: its expected log scale, 0 at the smallest and 1 at the largest */
     TG_OUT_DISTANCE = 7,     /* m travelled since the first sample, either way */
     TG_OUT_WHEEL_SPEED = 8,  /* + wheel; so are the next ones */
@@ -237,13 +237,13 @@ enum {
 
 typedef enum {
     TG_EVENT_NONE = 0,
-    TG_EVENT_OUTLIER = 1,    /* a value far from what the filter or its own past expects, taken softly */
+    TG_EVENT_OUTLIER = 1,    /* a value far from what the filter or its own past expects, given less weight */
     TG_EVENT_STANDSTILL = 2, /* slip and efficiency are undefined (NaN); adhesion and resistance are held */
     TG_EVENT_GAP = 3,        /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN */
     TG_EVENT_IMMOBILIZATION = 4, /* a warning: the wheels dig, the vehicle is about to get stuck */
     TG_EVENT_STUCK = 5,      /* the wheels turn, the vehicle hardly moves */
     TG_EVENT_PUSH = 6,       /* something pushes from behind while the wheels pull: a tool that runs up */
-    TG_EVENT_RESTART = 7     /* a step of the filter left the finite numbers: it starts anew from the priors at this row */
+    TG_EVENT_RESTART = 7     /* a step of the filter left the finite numbers: it restarts from the priors at this row */
 } tg_event;
 
 typedef enum { /* signs that the wheels dig, in points; the score is their sum, low-passed */
@@ -258,7 +258,7 @@ typedef enum { /* signs that the wheels dig, in points; the score is their sum, 
 typedef enum {
     TG_FILTERED = 0,
     TG_ALGEBRAIC = 1,
-    TG_SPEEDS = 2 /* without torque: speeds, slip, distance; all other values NaN. A wheel may stand for a drive train */
+    TG_SPEEDS = 2 /* without torque: speeds, slip, distance; all other values NaN. A wheel may represent a drive train */
 } tg_method;
 
 typedef struct {
@@ -273,7 +273,7 @@ typedef struct {
     tg_real value[165];
 } tg_estimate;
 
-typedef struct { /* spreads (1 SD) of constants that the data cannot tell; 0 = known */
+typedef struct { /* spreads (1 SD) of constants that the data cannot determine; 0 = known */
     tg_real drive_torque_gain;      /* relative, each wheel its own */
     tg_real drive_torque_gain_common; /* relative, all wheels together */
     tg_real drive_torque_offset;    /* N m, each wheel its own */
@@ -308,8 +308,8 @@ typedef struct { /* when the estimator warns of immobilization (see src/digging.
     tg_real push_duration;          /* s */
 } tg_watch_settings;
 
-/* The tuned numbers of this floor, all that there are beside thresholds in the settings; what halving and doubling each does:
- * docs/families.md. Scaled by the machine where that says how: T = sqrt(r/g), r its mean wheel radius, and V = sqrt(g r). */
+/* The tuned numbers of the estimator, all but the thresholds in the settings; the effect of halving and doubling each:
+ * docs/families.md. Scaled by the machine where noted: T = sqrt(r/g), r its mean wheel radius, and V = sqrt(g r). */
 typedef struct {
     tg_real adhesion_walk;          /* variance of a wheel's adhesion, gained in T */
     tg_real resistance_walk;        /* variance of the soil resistance, gained in T */
@@ -318,46 +318,46 @@ typedef struct {
     tg_real agility;                /* of gravity: a change of speed that a vehicle can do, hence no spike */
     tg_real increment_memory;       /* s: of the usual increments */
     tg_real input_lag;              /* s, at most: low-pass of measured loads, pitch, and the pull as the loads feel it */
-    tg_real unknown_slope;          /* rad: SD of a pitch never seen or long silent */
-    tg_real wheel_late;             /* intervals after which a wheel's last sample stands for nothing */
-    tg_real mounting_walk;          /* rad^2, gained in T: of what a pitch sensor does not tell of the slope */
+    tg_real unknown_slope;          /* rad: SD of a pitch never measured or long silent */
+    tg_real wheel_late;             /* intervals after which a wheel's last sample is no longer used */
+    tg_real mounting_walk;          /* rad^2, gained in T: of the slope that a pitch sensor does not show */
     tg_real terrain_walk;           /* rad^2, gained on a wheel radius of way: of the whole slope, where there is none */
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
     tg_real slip_memory;            /* s over which slip and adhesion are remembered for that */
     tg_real most_slope;             /* of slip over adhesion */
     tg_real slip_spread;            /* SD of a remembered slip; its variance grows by a fifth a second */
-    tg_real alike, carried_alike;   /* s over which the error of a reckoned speed stays alike; of one that the accelerometer carries on */
+    tg_real alike, carried_alike;   /* s over which the error of a dead-reckoned speed lasts; of one predicted by the accelerometer */
     tg_real reckoned_force, carried_force; /* force_walk times this beside it, meanwhile */
     tg_real shock_memory;           /* s: of what the accelerometer reads beyond the model */
     tg_real shock_samples;          /* samples that a shock lasts */
     tg_real longest_walk;           /* s of random walk that a gap adds at most: beyond it the ground is simply unknown */
     tg_real standstill;             /* V: below it a machine counts as standing */
-    tg_real settle;                 /* s: low-pass of the speeds that tell standstill */
+    tg_real settle;                 /* s: low-pass of the speeds that decide standstill */
     tg_real leap;                   /* s that a ground speed above it must last to end a standstill while no wheel turns */
-    tg_real unknown_torque;         /* adhesion: SD of a torque never seen or long silent */
+    tg_real unknown_torque;         /* adhesion: SD of a torque never measured or long silent */
     tg_real unknown_pull;           /* of the weight: SD of such a drawbar force */
-    tg_real least_load;             /* of a wheel's load at rest: it is never taken for less */
+    tg_real least_load;             /* of a wheel's load at rest: the least that is assumed */
     tg_real first_slip;             /* until the first ground speed */
     tg_real slow_share;             /* of the ground speed's noise: SD of an error that stays alike for long, */
     tg_real slow_stops;             /* as if so many stops had shown it */
     tg_real alike_memory;           /* ground speeds: over so many it is tallied how alike neighbouring innovations are, */
     tg_real alike_sure;             /* and counts beyond this many SDs of chance */
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
-    tg_real uneven_memory;          /* wheel radii over which their mean squares are taken */
+    tg_real uneven_memory;          /* wheel radii over which their mean squares are averaged */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
     tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
-    tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is low-passed, or taken as a mean */
+    tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is low-passed, or averaged */
     tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be at most */
     tg_real least_slip;             /* below it the secant of that curve is not known */
     tg_real small_slip;             /* SD of slip: a noise below it is small */
     tg_real lasting_share;          /* of what lasts beyond all trends: how likely it is adhesion, and not load */
-    tg_real soil_spread;            /* relative SD of the resistance of a field's soil: what it does beyond that may be slope, where nothing tells the slope; */
-    tg_real hill_memory;            /* wheel radii over which its mean and its SD are taken for that, at most */
+    tg_real soil_spread;            /* relative SD of the resistance of a field's soil: variation beyond it may be slope, where nothing measures the slope; */
+    tg_real hill_memory;            /* wheel radii over which its mean and its SD are averaged for that, at most */
     /* Of slip from speeds alone (TG_SPEEDS): what drivers and motors do, not scaled by the machine. */
     tg_real manoeuvre[3];           /* (m/s^2)^2/s, what the acceleration gains: a steady drive, driving by hand, sharp starts and stops */
     tg_real slipping[3];            /* 1/s, variance that slip gains: one ground and load, a rough one, a wheel that lets go */
     tg_real lasting, mode_dwell;    /* s: time constant of the acceleration; mean time in a pair of those densities */
-    tg_real first_rate;             /* m/s^2, SD of the acceleration before it was seen */
+    tg_real first_rate;             /* m/s^2, SD of the acceleration before any is known */
     tg_real slowest;                /* m/s: slower wheels change their slip speed no less */
     tg_real apart;                  /* 1 - the correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load */
 } tg_tuned;
@@ -366,13 +366,13 @@ typedef struct {
     int32_t method;                 /* tg_method */
     int32_t axles;                  /* 1..8 */
     int32_t towing;                 /* 1: a drawbar force is measured, so it is unknown until its first value; 0: none until then */
-    int32_t weighed, carrying;      /* 1: mass, vertical hitch load are measured, likewise; 0: they are never looked at */
+    int32_t weighed, carrying;      /* 1: mass, vertical hitch load are measured, likewise; 0: they are never used */
     int32_t wheel_axle[8];          /* which axle a wheel is on */
     int32_t driven[8];              /* 0: its torque is 0 */
     int32_t powered[8];             /* 1: a motor drives it, so the watch looks at it; of no wheel: at all. A driven wheel may be merely measured */
     tg_machine machine;
     tg_tuning tuning;
-    tg_real load_share[8];          /* axle: part of the weight it carries at rest on level ground */
+    tg_real load_share[8];          /* axle: part of the weight on it at rest on level ground */
     tg_real load_transfer[8];       /* axle, 1/m: load gained per N m of nose-down moment (two axles: 1/L, -1/L) */
     tg_real payload_share[8];       /* axle: part that it carries of the mass beyond the machine's, */
     tg_real payload_height;         /* m: which has its centre of gravity there */
@@ -393,8 +393,8 @@ typedef struct {
     tg_real prior_resistance, prior_resistance_std;
     tg_real slope_spread;           /* rad: by how much the slope may differ from the measured pitch (from 0 without one) */
     tg_real standstill_speed;       /* m/s; 0: by its tuned number and the machine's size */
-    tg_real dead_band;              /* m/s: TG_SPEEDS takes rims of at most this for unknown while the vehicle moves */
-    tg_real gap;                    /* s without any wheel or ground speed after which the motion starts anew */
+    tg_real dead_band;              /* m/s: TG_SPEEDS treats rims of at most this as unknown while the vehicle moves */
+    tg_real gap;                    /* s without any wheel or ground speed after which the motion starts again */
     tg_real max_step;               /* s; a longer step is predicted in pieces */
     tg_real outlier_weight;         /* a channel weighted below this flags the row */
     tg_real load_filter;            /* s, low-pass of the acceleration that moves the loads */
@@ -432,7 +432,7 @@ tg_status tg_estimator_snapshot(const tg_estimator *e, uint8_t *bytes);
 /* `room`: bytes of storage at `e`. TG_BAD_ARGUMENT where the snapshot's estimator needs more. */
 tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *bytes, size_t size);
 tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
-/* From the next sample on, these SDs and update periods of the channels (36 each, as in tg_settings); the estimate goes on. */
+/* From the next sample on, these SDs and update periods of the channels (36 each, as in tg_settings); the estimate continues. */
 tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg_real *held_period);
 /* cdef end */
 
@@ -485,10 +485,10 @@ struct tg_filter {
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* without a bank */
     tg_real P[TG_MAX_STATES * TG_ROWS];  /* instead of d and u, where `formed`, without a bank: rows `stride` apart, columns to the diagonal hold */
     int32_t formed;                      /* covariances are held, not factors */
-    int32_t factor_steps;                /* still to be taken with factors */
+    int32_t factor_steps;                /* still to be done with factors */
     tg_real x_prior[TG_ROWS];            /* of the last step, before its update */
     tg_passage passage;                  /* of the last step */
-    int32_t taken;                       /* channels of the last step, in the order taken */
+    int32_t taken;                       /* channels of the last step, in the order used */
     int32_t channel[TG_MAX_CHANNELS];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS]; /* each after the ones before it; without a bank */
     tg_real accelerometer[TG_ROWS];      /* row of H of a_x in the last step */

@@ -2,7 +2,7 @@
  * the mean product of whitened innovations (docs/decisions/0024-whitened-innovations.md). Sensitivities to ln a_j run through the whole
  * recursion, one lane a parameter.
  *
- * Channels are taken one by one, so S = T diag(variance) T' with T unit triangular from the gains. */
+ * Channels are used one by one, so S = T diag(variance) T' with T unit triangular from the gains. */
 #include "filter.h"
 
 #define SCALE_MIN ((tg_real)0.05)
@@ -141,7 +141,7 @@ TG_INLINE void descend(tg_adaptation_state *s, const tg_filter *f, const tgi_res
 }
 #undef DP
 
-/* C towards the products of the innovations, weighted and whitened by S of the very step, over the outputs taken; returns how many those
+/* C towards the products of the innovations, weighted and whitened by S of that step, over the outputs used; returns how many those
  * are. */
 static int remember_innovations(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *plan, const tgi_result *result)
 {

@@ -17,8 +17,8 @@ static tg_real follow(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_rea
     return f->value;
 }
 
-/* Considered constants in closed form (physics.md 6): a wheel acceleration a too much is an adhesion J a/(r F) too much, and rho_s takes
- * what the forces then lack. */
+/* Considered constants in closed form (physics.md 6): a wheel acceleration a too large is an adhesion J a/(r F) too large, and rho_s balances
+ * the forces. */
 static void consider_statically(tg_estimator *e, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
@@ -70,7 +70,7 @@ static void spread(tg_estimator *e, const tg_drive *drive)
     b->P[rho * stride + rho] = resistance;
 }
 
-/* One row of the algebraic method into the belief. `anew`: the past is another motion (first sample, gap, standstill, turn). */
+/* One row of the algebraic method into the belief. `anew`: nothing continues from before (first sample, gap, standstill, change of direction). */
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew)
 {
     const tg_settings *s = &e->settings;

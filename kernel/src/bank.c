@@ -85,7 +85,7 @@ void tgi_bank_init(tg_filter *f)
     for (int b = 0; b < TG_MODES; b++) f->policy.bank.probability[b] = (tg_real)1 / TG_MODES;
 }
 
-/* Each mode starts anew from the mixture of all, as seen from it. The mixture's own mean and covariance stay. */
+/* Each mode starts from the mixture of all, given itself. The mixture's own mean and covariance stay. */
 static void mix(const tg_filter *f, tgi_modes *m, tg_lanes *probability, array *a)
 {
     static const int all = TG_MODES;
@@ -116,7 +116,7 @@ TG_INLINE void bank_predict(const tgi_plan *plan, const tgi_modes *m, array *a, 
     bank_move(plan, m->x, x, n);
 }
 
-/* Variances of the channels before any is taken, of each mode. */
+/* Prior variances of the channels, of each mode. */
 TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lanes *noise, tg_lanes *S, const int n)
 {
     const tg_real *const h = plan->accelerometer;
@@ -133,7 +133,7 @@ TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lan
     }
 }
 
-/* Take one channel in every mode (Bierman's update, see factor_measure). `along`: U'h, zero before column `first`. */
+/* Update every mode with one channel (Bierman's update, see factor_measure). `along`: U'h, zero before column `first`. */
 TG_INLINE void bank_update_channel(const tgi_plan *plan, tgi_update *out, int o, const tg_lanes *along, int first, tg_lanes residual, const int n)
 {
     tgi_modes *const m = &out->state;
@@ -180,7 +180,7 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
     bank_update_channel(plan, out, n + 1, along, 0, bank_shock(plan, m->x, n), n);
 }
 
-/* What residual c takes from residual b < c: the channel's row of H times b's gain. */
+/* The part of residual b < c in residual c: the channel's row of H times b's gain. */
 TG_INLINE tg_lanes coupling(const tgi_plan *plan, const tgi_update *out, int c, int b, const int n)
 {
     tg_lanes sum = bank_zeros();
@@ -349,7 +349,7 @@ void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P)
         }
 }
 
-/* Every mode's outputs anew; `passage` gets the mixture's noise. */
+/* Restart every mode's outputs; `passage` gets the mixture's noise. */
 void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage)
 {
     const int n = f->wheels;

@@ -63,7 +63,7 @@ TG_INLINE void bank_move(const tgi_plan *plan, const tg_lanes *from, tg_lanes *t
     for (int i = n + 1; i < TG_TWICE(n); i++) to[i] = lanes_add(to[i], lanes_all(plan->shift[i]));
 }
 
-/* Innovations of the mixture and their variances, and the weights, before any channel is taken. S: each mode's own variances. */
+/* Innovations of the mixture and their variances, and the weights, before any update. S: each mode's own variances. */
 TG_INLINE void bank_innovations(const tg_filter *f, const tgi_plan *plan, const tg_lanes *S, tgi_update *out, const int n)
 {
     for (int o = 0; o < n + 2; o++) {

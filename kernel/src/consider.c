@@ -1,5 +1,5 @@
-/* Considered constants (Schmidt-Kalman, physics.md 6): what a constant that the data cannot tell does to the estimate. Columns pass through
- * the gains that the filter itself took; of a bank, through the gains' mean. */
+/* Considered constants (Schmidt-Kalman, physics.md 6): the effect on the estimate of a constant that the data cannot determine. Columns pass
+ * through the filter's own gains; of a bank, through the gains' mean. */
 #include "filter.h"
 
 size_t tg_consider_size(void) { return sizeof(tg_consider); }
@@ -49,7 +49,7 @@ TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_de
     }
 }
 
-/* Through the gains of the channels taken, each of which sees what the ones before it left; one SD shifts its residual by `shift`. */
+/* Through the gains of the channels used, each after those before it; one SD shifts its residual by `shift`. */
 TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, const int n, const int lanes)
 {
     for (int m = 0; m < f->taken; m++) {
@@ -77,7 +77,7 @@ TG_INLINE void consider(tg_consider *c, const tg_filter *f, const tg_real (*gain
     consider_update(c, f, gain, d, f->wheels, lanes);
 }
 
-/* The gains that the modes of a bank took, in the mean. */
+/* The mean gains of the modes of a bank. */
 static void mean_gains(const tg_filter *f, tg_real (*mean)[TG_ROWS])
 {
     const tg_bank_state *const bank = &f->policy.bank;

@@ -1,10 +1,10 @@
 /* The adhesion curve while driving (paper, Fig. 2): from single pairs of slip and adhesion the scale a of mu = a g(s), g the paper's
- * prototype, as a scalar Kalman filter. One pair tells the whole curve, as far as the soil keeps to its form. (R): noise, forgetting and
- * the way a new ground shows are ours. */
+ * prototype, as a scalar Kalman filter. One pair determines the whole curve, as far as the soil has that form. (R): noise, forgetting and
+ * the detection of new ground are ours. */
 #include "curve.h"
 
-/* The slips that the curve is fitted to (paper: 5 % to 60 %). Below, g is near 0 and a pair says nothing of a. The lower bound is put to
- * the mean of g: on single slips it would pick those whose error is upward. */
+/* The slips that the curve is fitted to (paper: 5 % to 60 %). Below, g is near 0 and a pair does not determine a. The lower bound applies to
+ * the mean of g: applied to single slips it would select those whose error is upward. */
 #define TG_LEAST_HEIGHT ((tg_real)0.2075) /* g(0.05) */
 #define TG_LARGEST_SLIP ((tg_real)0.6)
 
@@ -44,9 +44,9 @@ static tg_real height_at(tg_real slip)
     return slip < 0 ? -g : g;
 }
 
-/* How g answers to an error of slip: its slope, or where that is more, the mean slope down to two SDs less slip. High up g is flat and
- * its slope says that slip hardly matters; but a slip of 0.3 +- 0.13 may be none at all, as at a start. */
-static tg_real answer(tg_real slip, tg_real height, tg_real slope, tg_real variance)
+/* Sensitivity of g to an error of slip: its slope, or if larger, the mean slope down to two SDs less slip. At high slip g is flat, and by
+ * its slope slip hardly matters; but a slip of 0.3 +- 0.13 may be near 0, as at a start. */
+static tg_real sensitivity(tg_real slip, tg_real height, tg_real slope, tg_real variance)
 {
     tg_real reach = 2 * tgi_sqrt(variance);
     if (!(reach > (tg_real)0.01)) return slope; /* g is straight enough, and division by nothing is none */
@@ -55,7 +55,7 @@ static tg_real answer(tg_real slip, tg_real height, tg_real slope, tg_real varia
     return mean > slope ? mean : slope;
 }
 
-/* Seen from the prototype, odd in slip. `is_usable` is 0 where the pair says nothing. */
+/* A pair relative to the prototype, odd in slip. `is_usable` is 0 where the pair determines nothing. */
 tgi_observation tgi_observe(const tg_pair *p)
 {
     tgi_observation result;
@@ -66,7 +66,7 @@ tgi_observation tgi_observe(const tg_pair *p)
     result.is_usable = 1;
     result.adhesion = p->adhesion;
     result.height = p->slip < 0 ? -g : g;
-    result.slope = answer(s, g, -TG_CURVE_SLOW * first - TG_CURVE_RISE * second, p->slip_variance);
+    result.slope = sensitivity(s, g, -TG_CURVE_SLOW * first - TG_CURVE_RISE * second, p->slip_variance);
     result.variance = p->adhesion_variance;
     result.slip_variance = p->slip_variance;
     result.constant = p->adhesion_constant * p->adhesion_constant;
@@ -90,7 +90,7 @@ static tgi_measurement measure(const tgi_observation *k, tg_real a, tg_real size
     return m;
 }
 
-/* The mean of the wheels by `share`; their errors are taken as alike, which no count of wheels makes smaller. */
+/* The mean of the wheels by `share`; their errors are assumed equal, so no number of wheels reduces them. */
 static int32_t mean_of(const tgi_observation *observed, const tg_real *share, int32_t pairs, const tg_curve *c, tgi_measurement *mean)
 {
     const tg_real size = tgi_sqrt(c->a * c->a + c->variance);
@@ -146,8 +146,8 @@ static void start_anew(tg_curve *c, const tgi_measurement *m)
     c->height = m->height;
 }
 
-/* A row counts as the share dt/TG_MEMORY of an independent pair. The constants' column goes through the same gain (Schmidt-Kalman): no
- * number of pairs makes it smaller. */
+/* A row counts as the share dt/TG_MEMORY of an independent pair. The constants' column uses the same gain (Schmidt-Kalman): no
+ * number of pairs reduces it. */
 static void learn_pair(tg_curve *c, const tgi_measurement *m, tg_real dt)
 {
     average(c, m, dt);

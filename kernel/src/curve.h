@@ -1,4 +1,4 @@
-/* Inside the online curve: a pair seen from the prototype curve, worked out once for a wheel and for the vehicle. */
+/* Inside the online curve: a pair relative to the prototype curve, computed once for a wheel and for the vehicle. */
 #ifndef TG_CURVE_H
 #define TG_CURVE_H
 #include "filter.h"

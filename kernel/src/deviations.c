@@ -4,7 +4,7 @@
 /* A pull at the hitch that nothing measures reads as soil resistance, and the load that it moves between the axles is not known. */
 static int32_t pull_is_unseen(const tg_settings *s) { return !s->towing && s->hitch_height > 0 && s->axles > 1; }
 
-/* How many columns these spreads need: constants without a spread take none. */
+/* How many columns these spreads need: constants without a spread need none. */
 int32_t tgi_deviation_columns(const tg_settings *s)
 {
     const tg_uncertainty *u = &s->uncertainty;
@@ -73,7 +73,7 @@ static void add_hitch_load(const tg_estimator *e, tg_real inverse_mass, const tg
     d->acceleration[k] = d->accelerometer[k] = (add_loads(e, mu, gain, d, k) - mu[n] * spread) * inverse_mass;
 }
 
-/* The slope is known better where the motion shows it; what it leaves unknown of a whole slope is noise, see slope.c. */
+/* The slope is known better where the motion shows it; the remaining error of a whole slope is noise, see slope.c. */
 static tg_real slope_spread(const tg_estimator *e)
 {
     const tg_real given = e->settings.uncertainty.slope, found = tgi_sqrt(e->slope.error_variance);
@@ -119,6 +119,6 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
     if (s->carrying) add_hitch_load(e, inverse_mass, mu, d, k++);
     if (spread->acceleration_bias > 0) {
         d->accelerometer[k] = -spread->acceleration_bias;
-        d->acceleration[k] = e->slope.running ? -spread->acceleration_bias : 0; /* the slope takes it along, see slope.c */
+        d->acceleration[k] = e->slope.running ? -spread->acceleration_bias : 0; /* it is in the slope, see slope.c */
     }
 }

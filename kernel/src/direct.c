@@ -1,5 +1,5 @@
-/* The exact step on the covariance itself: a third of the work of factors, and it subtracts. Sound where a bound on what is left says so
- * (docs/decisions/0001-ud-factors.md); elsewhere the caller takes factors. Up to four wheels, double precision. */
+/* The exact step on the covariance itself: a third of the work of factors, but with subtraction. Sound where a bound on the result holds
+ * (docs/decisions/0001-ud-factors.md); elsewhere the caller uses factors. Up to four wheels, double precision. */
 #include "direct.h"
 
 #if TGI_DIRECT
@@ -114,7 +114,7 @@ typedef struct { /* the step on its way */
     tg_real noise; /* their product: the second half of the bound */
 } channel_updates;
 
-/* What is expected of a channel before any is taken, and what weight that gives it. */
+/* The innovation of a channel before any update, and its weight. */
 TG_INLINE void expect(const tg_filter *f, const tgi_plan *plan, channel_updates *t, int o, tg_real innovation, tg_real product)
 {
     tgi_result *const result = t->out->result;

@@ -10,7 +10,7 @@
 #endif
 
 /* The two halves of the bound. P' = F P F' + Q is at least its noise, so at least this share of its diagonal; and a channel leaves at
- * least R/S of what was there. The product of both shares stands ten thousand times above the rounding. */
+ * least R/S of what was there. The product of both shares is ten thousand times the rounding. */
 #define TGI_NOISE_SHARE ((tg_real)1e-5)
 #define TGI_FACTOR_STEPS 16 /* with factors, after the bound did not hold */
 

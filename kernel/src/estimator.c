@@ -93,7 +93,7 @@ static void carry_shared(const tg_filter *f, int32_t pieces, tg_real *shared)
     }
 }
 
-/* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to start anew. */
+/* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to restart. */
 static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
@@ -236,7 +236,7 @@ static void report_adaptation(const tg_estimator *e, tg_real *o)
         o[TG_OUT_ADAPTATION + j] = e->filter.policy.adaptive.adaptation.scale[tgi_row(e->filter.wheels, j)];
 }
 
-/* Whether nothing tells slip: after a gap, before both a wheel speed and the ground speed are back, and while wheels are silent. */
+/* Whether nothing determines slip: after a gap, before both a wheel speed and the ground speed are back, and while wheels are silent. */
 static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
 {
     if (gap) e->unseen = 3;
@@ -256,7 +256,7 @@ static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap, i
     return watched != TG_EVENT_NONE ? watched : row->outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
 }
 
-/* Inputs along the travel, as seen in the other direction. */
+/* Inputs along the travel, in the other direction. */
 static void mirror(tg_input *u, int32_t wheels)
 {
     for (int32_t i = 0; i < wheels; i++) u->torque[i] = -u->torque[i];

@@ -1,4 +1,4 @@
-/* Inside the estimator floor. Signals here are calibrated; "along" means in the direction of travel (physics.md 2). */
+/* Inside the estimator. Signals here are calibrated; "along" means in the direction of travel (physics.md 2). */
 #ifndef TG_ESTIMATOR_H
 #define TG_ESTIMATOR_H
 #include "curve.h"
@@ -45,18 +45,18 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
 typedef struct { /* what a row's values need beside the belief; all reals, so that it goes into a record */
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
-    tg_real warp[8]; /* wheel: what of its adhesion beyond all trends is no load, see warp.c */
-    tg_real chatter[8]; /* wheel: variance of an adhesion that goes to and fro from sample to sample, see inputs.c */
+    tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
+    tg_real chatter[8]; /* wheel: variance of an adhesion that alternates from sample to sample, see inputs.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
-    tg_real roughness; /* mean square of what rho_s wanders over uneven ground, see roughness.c */
+    tg_real roughness; /* mean square of the variation of rho_s over uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
     tg_real disputed;   /* of what its sensor and the forces disagree on, and of its samples' age, */
     tg_real late;       /* and of its delay */
-    tg_real anew; /* the filter was started anew: nothing links this row to the one before */
+    tg_real anew; /* the filter was restarted: nothing links this row to the one before */
 } tgi_scene;
 
 typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
@@ -64,7 +64,7 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real axle_load[8]; /* N */
     tg_real torque[8], mean_torque[8]; /* now, and over the step that ends now */
     tg_real drawbar, mean_drawbar;
-    tg_real calm_drawbar; /* filtered, for the loads, which know no uncertainty */
+    tg_real calm_drawbar; /* filtered, for the loads, which carry no uncertainty */
     tg_real mass, inverse_mass; /* kg, as measured, else the machine's */
     tg_real hitch_load;   /* N */
     tg_real slope, cosine, sine;
@@ -100,13 +100,13 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real own;                     /* mean variance of an adhesion, by the filter */
     tg_real wander;                  /* mean square of rho_s about its low-pass */
-    tg_real usual, swing, way;       /* rho_s over the way: its mean, its mean square about that, wheel radii that these stand for; 0: nothing yet */
+    tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
 } tgi_roughness;
 
-typedef struct { /* what wheels do beyond all trends, see warp.c */
+typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
     tg_real usual[8], slip[8]; /* wheel: slip as a rule, and beyond that low-passed over `slip_length` */
-    tg_real square, noise;     /* mean squares of that slip before the low-pass: what it is, and what the wheel speeds' errors make of it */
+    tg_real square, noise;     /* mean squares of that slip before the low-pass: the whole, and the part by errors of the wheel speeds */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
 } tgi_warped;
 
@@ -114,16 +114,16 @@ typedef struct { /* driven wheels over a stretch of the way, beyond their usual:
     tg_real adhesion[8], slip[8], length;
 } tgi_stretch;
 
-typedef struct { /* what slips tell of loads, see hidden.c */
+typedef struct { /* loads from slips, see hidden.c */
     tg_real adhesion[8], slip[8]; /* wheel: low-passed over the length of unevenness */
     tg_real pulling, slipping;    /* of all wheels, likewise */
-    tg_real way;                  /* wheel radii since the motion began anew */
+    tg_real way;                  /* wheel radii since the motion began */
     tgi_stretch now, last[2];     /* this one, the last, and the one before that */
     tg_real plain, beyond, weight, square, count; /* weighted means over so many pairs of stretches: of adhesions' products, of what slips add; the weights; the latter's squares */
     tg_real load;                 /* variance of adhesion by load beyond what adhesions show; may be less than 0 */
 } tgi_hidden;
 
-typedef struct { /* what stops tell of the ground speed, see slow_speed.c */
+typedef struct { /* errors of the ground speed that last, see slow_speed.c */
     tg_real mean, count;    /* of this stop's readings */
     tg_real squares, stops; /* of all stops, weighted */
     tg_real innovation;     /* of the last ground speed; 0: none */
@@ -167,7 +167,7 @@ typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */
 typedef struct { /* see speeds.c; all reals, since a smoother's record is this */
     tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES]; /* of all modes together: ground speed, its rate, slip speeds */
     tg_real probability[TG_SPEED_MODES];
-    tg_real seen[TG_MAX_WHEELS + 1];  /* 1: measured since the motion began anew; ground speed, wheels */
+    tg_real seen[TG_MAX_WHEELS + 1];  /* 1: measured since the motion began; ground speed, wheels */
     tg_real begun;                    /* 1: any of them was, so that the state is one */
     tg_real dt, manoeuvre, slipping;  /* how this row was reached: s, mean densities */
     tg_real anew;                     /* 1: nothing links this row to the one before */
@@ -293,7 +293,7 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 
-#define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is taken to be alike */
+#define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
 
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
@@ -361,8 +361,7 @@ typedef struct { /* slip, and its change with omega, v and the relative radius *
     tg_real slip, wheel, ground, radius;
 } tgi_slip;
 
-/* How fast a hub moves that goes at `along` in the vehicle's direction: of a steered wheel, which points along its way, with what goes
- * across. */
+/* Speed of a hub that moves at `along` in the vehicle's direction and at `across` sideways; a steered wheel points along its path. */
 TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
 {
     if (across == 0) return along;

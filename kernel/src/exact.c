@@ -1,5 +1,5 @@
 /* Exact engine: the model is affine in the state, so this time-varying Kalman filter is the Bayesian answer, and the unscented filter's
- * too. The predicted columns of U are F u, of which only the outputs' rows change. Channels are taken one by one, each as soon as the
+ * too. The predicted columns of U are F u, of which only the outputs' rows change. Channels are used one by one, each as soon as the
  * columns that it touches are factored, so that the two chains of divisions overlap; a_x, which touches all, comes last. */
 #include "factor.h"
 
@@ -23,7 +23,7 @@ TG_INLINE void exact_predict(const tg_filter *f, const tgi_factors *from, const 
 }
 
 /* Take one channel. `along`: U'h, zero before column `first`; `coupling`: h times the gains of the channels before it. From those come the
- * innovation and its variance as they were before any channel was taken, and from them the weight. */
+ * innovation and its variance before any update, and from them the weight. */
 TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int o, const tg_real *along, const tg_real *coupling,
                           int first, tg_real residual, const int n, const int stride)
 {

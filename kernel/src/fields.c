@@ -1,5 +1,5 @@
-/* What of an estimator goes into a snapshot, field by field: its settings, and what a row leaves for the next. What follows from the
- * settings alone is made anew, so that no padding, no pointer and no derived number is read from bytes. Whoever adds a field to the
+/* The contents of a snapshot, field by field: the estimator's settings, and the state that a row leaves to the next. What follows from the
+ * settings alone is recomputed, so that no padding, no pointer and no derived number is read from bytes. Whoever adds a field to the
  * estimator adds it here: kernel/tests/restore.c compares the objects byte for byte. */
 #include "fields.h"
 

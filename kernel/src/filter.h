@@ -1,4 +1,4 @@
-/* Inside the filter floor: what its files share.
+/* Inside the filter: what its files share.
  *
  * Rows run (mu_1..mu_n, rho_s, v, omega_1..omega_n), "row order": parameters first, because then a measured output touches only the
  * last columns of an upper triangular factor. The covariance is P = U diag(d) U', U unit upper triangular, kept by columns of `stride`
@@ -76,7 +76,7 @@ void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *re
 void tgi_adaptation_init(tg_filter *f);
 tg_status tgi_adapt(tg_filter *f, const tgi_plan *plan, const tgi_result *result);
 
-/* supervisor.c: gamma of this step, and what to remember of it once the step stands. */
+/* supervisor.c: gamma of this step, and what to remember of it once the step is valid. */
 void tgi_supervisor_init(tg_filter *f);
 tg_real tgi_supervise(const tg_filter *f, const tgi_plan *plan, const tg_input *now);
 void tgi_supervisor_remember(tg_filter *f, const tgi_plan *plan, const tg_input *now);

@@ -1,4 +1,4 @@
-/* The filter goes on with what it knows of the ground, its outputs given anew. */
+/* Restart the filter with its knowledge of the ground and new outputs. */
 #include "factor.h"
 #include "filter.h"
 #include "lanes.h"

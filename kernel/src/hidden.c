@@ -1,9 +1,9 @@
-/* What slips tell of loads that forces do not show (R; docs/decisions/0163). A wheel whose torque hardly answers to a bump takes it in
- * its slip: its force stays, and its adhesion changes with the load. Wheels share a curve, so that of a wheel's adhesion and slip, each
- * beyond its usual and the other wheels', mu - g' s is what the load does; g' is `bend` of the secant. In a row such slips are a fraction
- * of their noise. But unevenness is alike over more than a wheel radius, and noise is not: the mean product of two stretches of
- * `slip_length`, their middles twice that apart, holds no noise, and over a way it becomes sure. Only where no pattern of slips beyond
- * all trends is left; where there is, warp.c counts what slips hide. */
+/* Loads that forces do not show, from slips (R; docs/decisions/0163). A wheel whose torque hardly responds to a bump changes its slip
+ * instead: its force stays, and its adhesion changes with the load. Wheels share a curve, so with a wheel's adhesion and slip, each beyond
+ * its usual and the other wheels', mu - g' s is the effect of load; g' is `bend` of the secant. In one row such slips are a fraction
+ * of their noise. But unevenness is correlated over more than a wheel radius, and noise is not: the mean product of two stretches of
+ * `slip_length`, their middles twice that apart, contains no noise, and becomes certain with distance. Only where no pattern of slips
+ * beyond all trends is left; where there is, warp.c counts what slips hide. */
 #include "estimator.h"
 
 /* Product of two deviations, each beyond the others', a driven wheel in the mean. */
@@ -19,9 +19,9 @@ static tg_real product(const tg_estimator *e, const tg_real *a, const tg_real *b
     return (sum - of_a * of_b * share) * share / (1 - share);
 }
 
-/* What two stretches say, `away` wheel radii between their middles: of the variance that loads give adhesions, and of that of the
- * adhesions. The first counts by how far it is beyond chance, of loads as the adhesions show them. */
-static void take_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
+/* Add the products of two stretches, `away` wheel radii between their middles: to the variance of adhesion by load, and to that of the
+ * adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them. */
+static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
 {
     tgi_hidden *h = &e->hidden;
     const tg_tuned *k = &e->settings.tuned;
@@ -62,7 +62,7 @@ static void end_stretch(tg_estimator *e)
     const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2, apart = 2 * e->settings.tuned.slip_length;
     const tgi_stretch *const before = near >= apart ? last : older;
     const tg_real away = near >= apart ? near : far;
-    if (before->length > 0 && away < 2 * TG_LOAD_LENGTH && h->way > e->settings.tuned.uneven_length + far) take_product(e, now, before, away);
+    if (before->length > 0 && away < 2 * TG_LOAD_LENGTH && h->way > e->settings.tuned.uneven_length + far) add_product(e, now, before, away);
     *older = *last;
     *last = *now;
     memset(now, 0, sizeof *now);

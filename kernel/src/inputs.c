@@ -15,16 +15,16 @@ static void track(tg_hold *h, tg_real x, tg_real motion, tg_real noise, tg_real 
     h->variance = gain * noise * noise;
 }
 
-/* The value that a sample after a spike goes on from: the spike's own where the sample confirms it, else the last one that was none. */
+/* The value before a sample that follows a spike: the spike's own where the sample confirms it, else the last one that was none. */
 static tg_real before_spike(const tg_hold *h, tg_real x)
 {
     return h->spike > 0 && tgi_fabs(x - h->raw) < tgi_fabs(x - h->calm) ? h->raw : h->calm;
 }
 
-/* Take a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
- * 1 s; one far beyond it is a spike: until the next sample tells, the value before it stands and its square counts as uncertainty, and the
- * mean square sees it clipped. `rate`: what the signal may change a second without being one. `moving`: else the increments are those of a
- * standstill, which say nothing of the start. */
+/* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
+ * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
+ * it enters the mean square clipped. `rate`: the change a second that is no spike. `moving`: else the increments are those of a
+ * standstill, which show nothing of the start. */
 void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving)
 {
@@ -86,12 +86,12 @@ static void judge_leaps(tg_estimator *e, double time, tg_real dt)
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known but for the noise of two samples and what the input does beside the straight line. Each sample's noise is half of two
+ * it is known except for the noise of two samples and the input's deviation from the straight line. Each sample's noise is half of two
  * means, so that neighbouring steps share it: of one mean the variance is noise^2/2, but over many steps, over which an adhesion is
- * averaged, it adds up as noise^2 a step does. A ramp does nothing beside it; an input that walks at random (Brownian bridge) or leaps at
+ * averaged, it adds up as noise^2 a step does. A ramp does not deviate; an input that walks at random (Brownian bridge) or jumps at
  * some instant in between adds the twelfth of its squared increment, and its second difference has two of these squares, and six of the
- * noise. Where the step does not end with a sample, the last value stands: its error stays the same, so that `age` after it it has moved
- * the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input wanders on as a random walk w, of whose
+ * noise. Where the step does not end with a sample, the last value is used: its error stays the same, so that `age` after it it has moved
+ * the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input continues as a random walk w, of whose
  * integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
@@ -114,7 +114,7 @@ static tg_real shared_noise(const tg_hold *h, tg_real dt, tg_real noise)
     return tgi_square(dt * noise) * (part - part * part / 2);
 }
 
-/* Factor on the walks that the filter goes by: of the bank the mean over its modes, as they may have changed in dt. */
+/* Factor on the random walks in use: of the bank the mean over its modes, as they may have changed in dt. */
 static tg_real scale_of_walks(const tg_estimator *e, tg_real dt)
 {
     const tg_tuning *t = &e->settings.tuning;
@@ -139,8 +139,8 @@ static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_r
     return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
 }
 
-/* Variance of what a wheel's speed does from one sample to the next and takes back until the third, beyond its white noise; 0 below
- * TG_CHATTER of all that it does. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than
+/* Variance of the change of a wheel's speed from one sample to the next that the third reverses, beyond its white noise; 0 below
+ * TG_CHATTER of the whole change. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than
  * its mean. White noise, whatever its size, has one half (docs/decisions/0026). */
 tg_real tgi_chatter(const tg_hold *h, tg_real noise)
 {

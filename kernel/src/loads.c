@@ -95,8 +95,8 @@ static void take_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg
         if (!measured[k]) load[k] += (rest - computed) * s->load_share[k] / share;
 }
 
-/* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; beside
- * it what the vehicle carries more than the file says, with shares and a height of its own, and what hangs on the hitch. A wheel keeps at
+/* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; added
+ * to it a payload beyond the file's mass, with its own shares and height, and the load on the hitch. A wheel keeps at
  * least 2 % of its static load: the model divides by it. */
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
 {

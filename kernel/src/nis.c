@@ -1,5 +1,5 @@
 /* Normalised innovation squared where one step has less noise than the filter counts: an input's error that neighbouring steps share adds
- * up over many of them as if each step had it whole, so the filter counts it whole; a single innovation knows only its own part (decision
+ * up over many of them as if each step had it whole, so the filter counts it whole; a single innovation contains only its own part (decision
  * 0096). */
 #include "filter.h"
 
@@ -18,7 +18,7 @@ tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, con
     return sum;
 }
 
-/* What residual c takes from residual b < c: the channel's row of H times b's gain. */
+/* The part of residual b < c in residual c: the channel's row of H times b's gain. */
 static tg_real coupling(const tgi_plan *plan, const tgi_result *result, int c, int b, int n)
 {
     const tg_real *const gain = result->gain[b];

@@ -1,7 +1,7 @@
 /* What a raw sample is worth: calibration, impossible and held values; standstill and the direction of travel. */
 #include "estimator.h"
 
-/* A held channel repeats its last value until it is measured anew. A repetition counts as a measurement only after 1.5 periods, and
+/* A held channel repeats its last value until the next measurement. A repetition counts as a measurement only after 1.5 periods, and
  * then only of an input (constant torque is common) or of 0 (standstill): a speed that stays the same to the last bit is a silent
  * sensor. */
 static int is_repetition(const tg_estimator *e, int32_t slot, tg_real raw, double time)
@@ -47,12 +47,12 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     row->reckoned = 0;
     row->held_wheels = 0;
     for (int32_t c = 0; c < TG_MAX_CHANNELS; c++) row->channel_nis[c] = (tg_real)NAN;
-    memset(row->doubt, 0, sizeof row->doubt); /* until tgi_doubt_speeds, which not every method asks */
+    memset(row->doubt, 0, sizeof row->doubt); /* until tgi_doubt_speeds, which not every method calls */
     return TG_OK;
 }
 
-/* A speed that leaps is a spike until the next sample tells: until then the leap itself is its uncertainty. A leap that a vehicle can do
- * is none. */
+/* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
+ * is capable of is no spike. */
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
 {
     const tg_settings *s = &e->settings;
@@ -67,7 +67,7 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
     }
 }
 
-/* First-order low-pass by the backward Euler rule over the time since the last sample; the first sample is taken whole. */
+/* First-order low-pass by the backward Euler rule over the time since the last sample; the first sample is used as it is. */
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
 {
     if (isnan(x)) return f->value;
@@ -83,7 +83,7 @@ static int32_t recent(const tg_lowpass *f, double time, tg_real age)
     return f->seen && time - f->time <= (double)age;
 }
 
-/* The yaw rate as last measured; after a second without it the vehicle is taken to drive straight. */
+/* The yaw rate as last measured; after a second without it the vehicle is assumed to drive straight. */
 void tgi_track_turn(tg_estimator *e, const tg_row *row)
 {
     if (!isnan(row->value[TG_YAW_RATE])) {
@@ -94,7 +94,7 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
     }
 }
 
-/* Whether the ground speed speaks against standstill. While no wheel turns, half a second of it must: a single leap is the sensor's. */
+/* Whether the ground speed contradicts standstill: while no wheel turns, for half a second, since a single jump is the sensor's. */
 static int32_t moves(tg_estimator *e, tg_real ground, double time)
 {
     if (tgi_fabs(ground) < 2 * e->settings.standstill_speed) e->slow_time = time;
@@ -120,8 +120,7 @@ static tg_real settle(tg_lowpass *f, tg_real x, double time, settling *pass)
     return f->value;
 }
 
-/* A speed as soon as its noise allows to tell it from standstill: low-passed until that is a quarter of the threshold, and not longer than
- * tau. */
+/* A speed, low-passed only until its noise is a quarter of the threshold of standstill, and not longer than tau. */
 static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real noise, tg_real threshold)
 {
     if (isnan(x)) return f->value;
@@ -134,8 +133,8 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
     return f->value;
 }
 
-/* Low-passed speeds tell standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis so
- * that noise does not flicker. A ground speed that is a second old no longer counts. Returns 1 where the direction has turned. */
+/* Low-passed speeds decide standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis
+ * against noise. A ground speed that is a second old no longer counts. Returns 1 where the direction has changed. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
@@ -167,7 +166,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders by its noise */
     e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold + 2 * s->noise[TG_GROUND_SPEED];
 
-    const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed says less than the wheels */
+    const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed counts less than the wheels */
     tg_real motion = (rim + trust * course) / (1 + trust);
     if (e->standing || tgi_fabs(motion) < s->standstill_speed) return 0;
     int32_t direction = motion > 0 ? 1 : -1, turned = direction != e->direction;

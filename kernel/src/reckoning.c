@@ -1,5 +1,5 @@
-/* Ground speed while its sensor is silent: wheel speed less the slip last seen, at the adhesion of now (R). Without it nothing tells slip
- * and soil resistance apart, and the estimate of v runs off with every error of the forces. */
+/* Ground speed while its sensor is silent: wheel speed less the last slip, at the present adhesion (R). Without it nothing separates slip
+ * from soil resistance, and the estimate of v drifts with every error of the forces. */
 #include "estimator.h"
 
 /* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. */
@@ -41,8 +41,8 @@ static tg_real slip_at(const tgi_slip_memory *m, tg_real most, tg_real adhesion)
     return result < (tg_real)-0.2 ? (tg_real)-0.2 : result > (tg_real)0.8 ? (tg_real)0.8 : result;
 }
 
-/* Give the row a reckoned ground speed where the sensor has been silent. Its error stays alike for a while, which the variance makes up
- * for: a white one would be averaged away. With an accelerometer it only corrects the speed that the accelerometer carries on. */
+/* Give the row a ground speed by dead reckoning where the sensor has been silent. Its error lasts for a while, which the variance allows
+ * for: a white one would be averaged away. With an accelerometer it only corrects the speed that the accelerometer predicts. */
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
 {
     const tg_tuned *const k = &e->settings.tuned;

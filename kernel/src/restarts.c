@@ -1,16 +1,16 @@
-/* How the filter goes on where the motion does not: at rest, at the start from it, after a gap, where it has lost its way. */
+/* The filter where the motion is interrupted: at rest, at the start from it, after a gap, after it diverged. */
 #include "estimator.h"
 
 #define TG_NO_TIME ((tg_real)1e-6) /* s */
 
-/* Considered columns, and a smoother's track, go along with whatever the filter just did. */
+/* Considered columns, and a smoother's track, follow the filter's last step. */
 void tgi_follow(tg_estimator *e, const tg_deviations *deviations)
 {
     tg_consider_step(&e->consider, &e->filter, deviations);
     if (e->track) tg_track_step(e->track, &e->filter);
 }
 
-/* A filter that has lost its way knows the priors again. */
+/* A filter that diverged starts again from the priors. */
 void tgi_forget(tg_estimator *e)
 {
     tgi_filter_anew(&e->filter, &e->consider, &e->settings);
@@ -18,7 +18,7 @@ void tgi_forget(tg_estimator *e)
     e->scene.anew = 1;
 }
 
-/* Start the outputs anew at `outputs`, the parameters having walked for `walk` seconds. */
+/* Restart the outputs at `outputs`, with `walk` seconds of the parameters' random walk added. */
 static void restart(tg_estimator *e, tg_real walk, const tg_real *outputs, const tg_real *variances)
 {
     if (walk > e->settings.tuned.longest_walk) walk = e->settings.tuned.longest_walk;
@@ -57,8 +57,8 @@ void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
     restart(e, walk, x, P);
 }
 
-/* What adhesion was before a standstill or a turn of direction says little of the start: it is as unknown as at first. No time passes, but
- * the filter takes a time above 0. */
+/* Adhesion before a standstill or a change of direction shows little of the start: it is as uncertain as at first. No time passes, but
+ * the filter needs a time above 0. */
 void tgi_unknown_adhesion(tg_estimator *e)
 {
     const int32_t n = e->settings.machine.wheels;
@@ -85,8 +85,8 @@ void tgi_turn(tg_estimator *e)
     tgi_place_adhesion(&e->filter, mu);
 }
 
-/* At standstill the low-passed speeds stand for the outputs. Adhesion is held; before the first motion there is none to hold, and it is
- * what the torques say, as little known as ever. */
+/* At standstill the low-passed speeds are the outputs. Adhesion is held; before the first motion there is none to hold, and it follows
+ * from the torques, as uncertain as the prior. */
 void tgi_rest(tg_estimator *e, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
@@ -102,8 +102,8 @@ void tgi_rest(tg_estimator *e, const tg_drive *drive)
     if (e->distance > 0) return;
     tg_real mu[TG_MAX_WHEELS];
     for (int32_t i = 0; i < n; i++) {
-        const tg_real said = e->torque[i].count ? d * e->torque[i].value / (s->machine.radius[i] * drive->load[i]) : 0;
-        mu[i] = tgi_fabs(said) > 1 ? e->belief.x[i] : said;
+        const tg_real by_torque = e->torque[i].count ? d * e->torque[i].value / (s->machine.radius[i] * drive->load[i]) : 0;
+        mu[i] = tgi_fabs(by_torque) > 1 ? e->belief.x[i] : by_torque;
     }
     tgi_place_adhesion(&e->filter, mu);
 }

@@ -1,12 +1,11 @@
-/* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load comes and goes over the ground's
- * bumps: the force follows the load, and the estimate takes it for adhesion. Wheels at one slip share a curve, so what one wheel's
- * adhesion does beyond the others' within a few wheel radii is taken for unseen load, a variance relative to the adhesion; where only one
- * wheel is driven, what it does beyond its own mean. rho_s wanders likewise: the body pitches over the bumps, which accelerometer and
- * pitch sensor take for a slope, and soil itself takes longer to change. Lengths are in wheel radii, so a machine of another size sees
- * its own ground. */
+/* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load varies over the ground's
+ * bumps: the force follows the load, and the estimate mistakes it for adhesion. Wheels at one slip share a curve, so the difference of one
+ * wheel's adhesion from the others' within a few wheel radii counts as unseen load, a variance relative to the adhesion; where only one
+ * wheel is driven, its difference from its own mean. rho_s varies likewise: the body pitches over the bumps, which accelerometer and
+ * pitch sensor read as a slope, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
 #include "estimator.h"
 
-#define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is what it is late for */
+#define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */
 #define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
 #define TG_SMALL_RESISTANCE ((tg_real)1.6e-5) /* .004 squared */
 
@@ -45,7 +44,7 @@ static void watch_hills(tg_estimator *e, tg_real rho, tg_real travelled)
     r->swing += gain * (tgi_square(rho - r->usual) - r->swing);
 }
 
-/* After a row's estimate, `distance` m behind the one before. `flowing`: the row goes on from that one. */
+/* After a row's estimate, `distance` m behind the one before. `flowing`: the row continues that one. */
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 {
     tgi_roughness *r = &e->roughness;
@@ -82,8 +81,8 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Relative variance of a wheel's load that the loads of the model do not hold: of the scatter what is not the estimates' own noise
- * (docs/decisions/0159), and what slips tell beside it (hidden.c). Of a load that is alike over TG_LOAD_LENGTH the low-pass leaves
+/* Relative variance of a wheel's load that the loads of the model do not contain: the scatter less the estimates' own noise
+ * (docs/decisions/0159), with what slips show (hidden.c). Of a load that is correlated over TG_LOAD_LENGTH the low-pass leaves
  * length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
@@ -92,8 +91,8 @@ tg_real tgi_unseen_load(const tg_estimator *e)
     return whole * tgi_relative(e, tgi_by_load(e, scatter)) + tgi_square(k->least_load_spread);
 }
 
-/* Variance of the slope that rho_s may hold where nothing tells the slope: thrust goes into hills and soft soil alike. What rho_s does
- * about its mean, now or as a rule, beyond what one soil's resistance does and the slope that the vehicle's file states. */
+/* Variance of the slope that rho_s may contain where nothing measures the slope: hills and soft soil both need thrust. The variation of
+ * rho_s about its mean, now or as a rule, beyond that of one soil's resistance and the slope that the vehicle's file states. */
 tg_real tgi_unseen_grade(const tg_estimator *e)
 {
     const tgi_roughness *r = &e->roughness;

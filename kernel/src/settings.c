@@ -1,7 +1,7 @@
 /* Settings of the estimator: defaults, checks, and an estimator made from them. */
 #include "estimator.h"
 
-/* The warning's on simulated drives and made-up snow runs, see docs/decisions/0100. */
+/* Of the warning: set on simulated drives and simulated snow runs, see docs/decisions/0100. */
 static tg_watch_settings default_watch(void)
 {
     tg_watch_settings w;
@@ -275,7 +275,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     for (int32_t b = 0; b < TG_MODES && high > low; b++) c->scale_score[b] = tgi_log(s->tuning.scales[b] / low) / tgi_log(high / low);
 }
 
-/* A filter that knows the priors only, and its considered columns. */
+/* A filter with the priors only, and its considered columns. */
 tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s)
 {
     const int32_t n = s->machine.wheels, nx = 2 * n + 2;

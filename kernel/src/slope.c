@@ -1,8 +1,8 @@
 /* Slope as the motion shows it, where there is an accelerometer: it reads dv/dt + g sin(slope), so what it reads beyond the change of
  * ground speed is slope. A pitch sensor alone errs by its mounting and by wheels that sink unevenly; without one the whole slope is
- * found. A Kalman filter of two states, ground speed and slope error, beside the main one (R). Of a whole slope, what its error makes of
- * the speed over a step is noise of the main filter's, which then weighs ground speeds as this one does. The accelerometer's bias goes
- * into the error too, as it should: the two then agree on dv/dt. */
+ * found. A Kalman filter of two states, ground speed and slope error, beside the main one (R). The effect of a whole slope's error on the
+ * speed over a step is process noise of the main filter, which then weights ground speeds as this one does. The accelerometer's bias is
+ * part of the slope error too, as it should be: the two then agree on dv/dt. */
 #include "estimator.h"
 
 #define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad: no vehicle of ours drives steeper */

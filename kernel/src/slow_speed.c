@@ -1,11 +1,11 @@
-/* The part of the ground speed's noise that does not average out (R): receivers filter, so that their errors stay alike for seconds to
+/* The part of the ground speed's noise that does not average out (R): receivers filter, so their errors last for seconds to
  * minutes. While driving it cannot be separated from slip, but at rest the speed is 0, and the mean of what the sensor reads there,
  * beyond its white noise, is one sample of that error a stop. Before the first stops a share of the noise is assumed to be slow. Errors
- * of seconds, hills that the forces do not know and a late receiver show while driving: innovations that follow each other are then
- * alike, and those of white noise are not. */
+ * of seconds, hills that the forces do not show and a late receiver appear while driving: neighbouring innovations are then
+ * correlated, and with white noise they are not. */
 #include "estimator.h"
 
-#define TG_SAMPLE_AGE ((tg_real)0.288675) /* sqrt(1/12) intervals: a sample may stand for any instant of its own */
+#define TG_SAMPLE_AGE ((tg_real)0.288675) /* sqrt(1/12) intervals: a sample may be of any instant of its own */
 
 /* At rest: `row` may hold one more reading. */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row)

@@ -1,7 +1,7 @@
 /* Smoother: Rauch, Tung and Striebel (1965) backwards over records, one a row, written forwards.
  *
  * Between two records lies an affine map x' = F x + shift with noise Q, composed of all steps in between. With
- * G = P F' (F P F' + Q)^-1 the smoothed covariance is taken as (I - G F) P (I - G F)' + G Q G' + G P' G': a sum of terms that are each
+ * G = P F' (F P F' + Q)^-1 the smoothed covariance is computed as (I - G F) P (I - G F)' + G Q G' + G P' G': a sum of terms that are each
  * positive semidefinite, unlike P + G (P' - P_prior) G'. Of a bank, moments and noise are the mixture's: an approximation. */
 #include "filter.h"
 

@@ -1,4 +1,4 @@
-/* An estimator as bytes: a header that tells what the bytes are, the settings, the state field by field (fields.c), a checksum. A
+/* An estimator as bytes: a header that identifies them, the settings, the state field by field (fields.c), a checksum. A
  * checksum is no signature: what is restored may be anything, so its settings are checked as new ones are, and every count and index
  * against its range. */
 #include "fields.h"

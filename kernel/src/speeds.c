@@ -1,6 +1,6 @@
 /* Slip from speeds alone, where no torque is measured (docs/decisions/0110). The state is the ground speed v, its rate a, and of each
  * wheel the slip speed d = r omega - (v - side yaw_rate), in the vehicle's own directions: so both speeds are linear in it, and a wheel
- * that spins at rest is no special case (a steered wheel's hub moves at more than v - side yaw_rate, by what the last v tells). a is an
+ * that spins at rest is no special case (a steered wheel's hub moves faster than v - side yaw_rate, computed with the last v). a is an
  * Ornstein-Uhlenbeck process (Singer 1970), d a random walk in proportion to speed. How hard both are driven is not known: TG_SPEED_MODES
  * filters, one a pair of densities, are mixed as an interacting multiple model (Blom and Bar-Shalom 1988). The same in NumPy:
  * tests/estimation/kernel_twin/speeds.py. */
@@ -57,7 +57,7 @@ static void passage_of(tg_real dt, tg_real lasting, tg_real *reach, tg_real *kee
     *keep = tgi_exp(-dt / lasting);
 }
 
-/* Channel c sees v, a wheel v + d. */
+/* Channel c measures v, a wheel v + d. */
 TG_INLINE tg_real read_of(const tg_real *x, int32_t c) { return x[0] + (c ? x[1 + c] : 0); }
 
 static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
@@ -65,8 +65,8 @@ static tg_real spread(const tg_real (*P)[SIZE], int32_t c)
     return c ? P[0][0] + 2 * P[0][1 + c] + P[1 + c][1 + c] : P[0][0];
 }
 
-/* Take the samples one after another. A sample beyond `huber` SDs of what is expected before any was taken counts less, but for a ground
- * speed that the next one confirms: rims alone would hold the estimate up for ever where all wheels lose hold together. */
+/* Update with the samples one after another. A sample beyond `huber` SDs of the prediction counts less, except a ground
+ * speed that the next one confirms: rims alone would hold the estimate for ever where all wheels lose grip together. */
 static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_samples *in, tg_real huber, int32_t size)
 {
     for (int32_t k = 0; k < in->count; k++) {
@@ -86,7 +86,7 @@ static void update(tgi_speed_mode *m, tgi_speed_fit *fit, const tgi_speed_sample
             m->x[i] += gain * innovation;
             for (int32_t j = 0; j < size; j++) m->P[i][j] -= gain * column[j];
         }
-        fit->nis[c] = innovation * innovation / variance; /* with what the samples before it tell of it */
+        fit->nis[c] = innovation * innovation / variance; /* given the samples before it */
         fit->score -= (fit->nis[c] + tgi_log(variance)) / 2;
     }
 }
@@ -161,7 +161,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
         s->manoeuvre += p * tuned->manoeuvre[m / TG_LEVELS];
         s->slipping += p * tuned->slipping[m % TG_LEVELS];
         for (int32_t k = 0; k < in->count; k++) {
-            const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed stands first here, after the wheels elsewhere */
+            const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed is first here, after the wheels elsewhere */
             if (m == 0) row->channel_nis[place] = 0;
             row->channel_nis[place] += p * fit[m].nis[c];
             e->belief.nis += p * fit[m].nis[c];
@@ -169,7 +169,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
         }
     }
     for (int32_t k = 0; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
-    if (!isnan(in->y[0])) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0; /* the ground speed is taken first */
+    if (!isnan(in->y[0])) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0; /* the ground speed comes first */
     merge(s, e->speed_mode, size);
 }
 
@@ -217,7 +217,7 @@ static void forget(tg_estimator *e)
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) e->speeds.probability[m] = (tg_real)1 / TG_SPEED_MODES;
 }
 
-/* Rims that stand while the vehicle goes: no wheels do that, but a speed that reads 0 below what its sensor can see does. */
+/* Rims that read 0 while the vehicle moves: no locked wheels, but a sensor's dead band at low speed. */
 static int32_t rims_are_blind(const tg_estimator *e, const tg_row *row, int32_t *any)
 {
     const tg_settings *s = &e->settings;
@@ -249,7 +249,7 @@ static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speed
         if (!isnan(in->y[c])) in->given[in->count++] = c;
 }
 
-/* Whether there is nothing to tell slip from, now or since the motion began. */
+/* Whether nothing determines slip, now or since the motion began. */
 static int32_t is_blind(const tgi_speeds *s, int32_t n)
 {
     int32_t wheel = 0;

@@ -1,4 +1,4 @@
-/* What a row says of slip from speeds alone (speeds.c). */
+/* The values of a row, for slip from speeds alone (speeds.c). */
 #include "estimator.h"
 
 /* The row's values from the state; the radius is considered: it shifts slip, and no sample shows it. */

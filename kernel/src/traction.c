@@ -53,7 +53,7 @@ TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene,
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]) + scene->chatter[i];
 }
 
-/* Slip lies in [-1, 1], so no spread above 1 says more than 1 does; the same is said of the efficiency. */
+/* Slip is within [-1, 1], so a spread above 1 means no more than 1; likewise of the efficiency. */
 TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 ? variance : 1); }
 
 /* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load:

@@ -1,11 +1,11 @@
 /* Unscented engine, the paper's: 2 nx + 1 sigma points through Runge-Kutta 4 of the model, moments by their weights, sigma points redrawn
  * before the update. The factors come from the weighted deviations by Gram-Schmidt, and so does the update: factoring the covariance of
- * [x; y] with the channels' rows taken first gives the gains (the channels' columns) and the posterior factors (the rest). */
+ * [x; y] with the channels' rows first gives the gains (the channels' columns) and the posterior factors (the rest). */
 #include "factor.h"
 #include "model.h"
 
 typedef struct {
-    tg_real spread;      /* sigma points stand sqrt(spread) factors from the mean */
+    tg_real spread;      /* sigma points are sqrt(spread) factors from the mean */
     tg_real mean, other; /* weights in the mean: of the centre and of each other point */
     tg_real covariance;  /* weight of the centre in the covariance */
 } weights;
@@ -70,7 +70,7 @@ TG_INLINE void unscented_predict(const tg_filter *f, const tgi_plan *plan, const
     tgi_factor_last(&gram, plan->passage.q[0], out->u, out->d);
 }
 
-/* Rows of the joint factor: the state, then a_x, v, omega_1..omega_n: the last is taken first, as in the exact engine. */
+/* Rows of the joint factor: the state, then a_x, v, omega_1..omega_n: the last comes first, as in the exact engine. */
 TG_INLINE int joint_row(const int n, int o) { return o == n + 1 ? TG_TWICE(n) : TG_TWICE(n) + 1 + o; }
 
 /* Append the channels to the points; a missing one reads 0 everywhere. */

@@ -1,13 +1,12 @@
 /* What a stiff chassis shifts between wheels (R; docs/decisions/0144). Loads that ground unevenness moves from wheel to wheel keep their
- * sum and both moments, so on the wheels they make a pattern that is neither alike, nor front against rear, nor left against right: one
- * diagonal against the other. Nothing on board measures it, and estimates take it for adhesion. True adhesions differ by axle and by
- * side, hardly by diagonal; so of that pattern only what lasts longer than unevenness does may be adhesion, or a load that hills shift
- * (docs/decisions/0144). Besides, wheels share a curve: a wheel that bears less slips more, and what it slips beyond the trends, along
- * the curve, is true adhesion. Errors of the ground speed are alike on all wheels, so they are not in it; those of the wheels' speeds
- * are, and what they make is known. */
+ * sum and both moments, so on the wheels they make a pattern that is neither equal on all, nor front against rear, nor left against right:
+ * one diagonal against the other. Nothing on board measures it, and estimates mistake it for adhesion. True adhesions differ by axle and by
+ * side, hardly by diagonal; so the part of that pattern that lasts longer than unevenness may be adhesion, or a load that hills shift.
+ * Besides, wheels share a curve: a wheel that carries less slips more, and its slip beyond the trends, along the curve, is true adhesion.
+ * Errors of the ground speed are equal on all wheels and drop out; the variance by those of the wheel speeds is known. */
 #include "estimator.h"
 
-#define TG_TRENDS 3 /* alike, along, across */
+#define TG_TRENDS 3 /* equal, along, across */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends
  * leave patterns. */
@@ -67,7 +66,7 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
 }
 
 /* Slips of the driven wheels of a vehicle that turns at `yaw` rad/s, and the variance that the errors of the wheels' speeds give one of
- * them in the mean. 0: they tell nothing. */
+ * them in the mean. Returns 0 where they show nothing. */
 int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance)
 {
     const tg_settings *s = &e->settings;
@@ -106,10 +105,10 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
         return;
     }
     const tg_real rolled = travelled * rims_way(e), soon = rolled / (e->settings.tuned.slip_length + rolled);
-    const tg_real fresh = rolled / (e->settings.tuned.uneven_length + rolled); /* where wheels spin on the spot the vehicle's way stands still */
+    const tg_real fresh = rolled / (e->settings.tuned.uneven_length + rolled); /* of the rims' distance: the vehicle covers none where wheels spin on the spot */
     tgi_warp(c, slip, warp);
     const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
-    const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row tells less than usual */
+    const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row is less certain than usual */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
         w->usual[i] += weight * gain * beyond;
@@ -125,7 +124,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
 }
 
 /* After a row's estimate, `travelled` wheel radii behind the one before; `fresh` and `gain`: its weights over the length and the memory of
- * unevenness. `flowing`: the row goes on from that one; else its adhesions may be anything, and what lasted before stays. */
+ * unevenness. `flowing`: the row continues that one; else its adhesions may be anything, and what lasted before stays. */
 void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
 {
     tgi_warped *w = &e->warped;
@@ -140,8 +139,8 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
  * farther. */
 static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
 
-/* What of the adhesions beyond the trends is no load (n,): of what lasts, a share, for a rut does that and a hill; and what slips tell.
- * Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was explained already. */
+/* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
+ * show. Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was explained. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;

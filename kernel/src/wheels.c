@@ -1,6 +1,6 @@
 /* Wheel speeds between their samples (R; docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so that its
- * speed changes as slowly as the drive does, while a torque's noise, let alone a stale torque, integrated over the time between runs away
- * with it. There the last sample stands for the speed, and the adhesion takes what the torque says. */
+ * speed changes as slowly as the vehicle's, while a torque's noise, or an old torque, integrated over the time between would make it run
+ * away. There the last sample is used for the speed, and the adhesion follows the torque. */
 #include "estimator.h"
 
 /* Give the row the speeds of wheels that it does not measure; `dt` 0: none. All rows until the next sample share one error, and so

@@ -124,7 +124,7 @@ def estimated(
         known.sample.check_against(vehicle)
     # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
-    track, said = turn_in(log, known.sample, vehicle)
+    track, turn_notes = turn_in(log, known.sample, vehicle)
     sensors = dict(options.sensors or {})
     # By consecutive rows, which a sample of them does not hold.
     if vehicle.sensors.ground_speed_delay is None:
@@ -149,7 +149,7 @@ def estimated(
     checks.shutdown(wait=False)
 
     def notes() -> tuple[str, ...]:
-        return (*found.result(), *said)
+        return (*found.result(), *turn_notes)
 
     blocks = (known.without_empty(block) for block in log.blocks())
     forward = passes.of(log.from_disk)

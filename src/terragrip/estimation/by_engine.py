@@ -1,4 +1,4 @@
-"""A log whose machine tells its engine's torque: block by block as that of a machine of driven wheels, and its estimates completed."""
+"""A log with the engine's torque in place of wheel torques: estimated block by block as a machine of driven wheels, then completed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ByEngine:
         return LogBlocks(log.rows, blocks, lambda: self._converted(self._whole, 0)[0], log.from_disk)
 
     def completed(self, parts: Iterator[Estimates]) -> Iterator[Estimates]:
-        """Estimates of that machine with the spread of what the driveline takes, and open where no torque stands."""
+        """Estimates of that machine, widened by the uncertainty of the driveline's losses; NaN where no torque is known."""
         for part in parts:
             columns = {**part.columns, **self.machine.completed(part.columns, self._waiting.popleft().std)}
             columns = {name: values for name, values in columns.items() if self.machine.shows(name)}

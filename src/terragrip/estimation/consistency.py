@@ -1,4 +1,4 @@
-"""How well estimates agree with observations, and whether a filter's intervals are honest.
+"""How well estimates agree with observations, and whether a filter's intervals are right.
 
 Pure functions of arrays. A row counts only where every array of the call is finite; no such row at all is an
 :class:`~terragrip.errors.InputError`, never a silent NaN.
@@ -65,14 +65,14 @@ def agreement(observed: ArrayLike, predicted: ArrayLike, mask: ArrayLike | None 
     (physics.md 5; paper, section 3). Raises InputError when fewer than two rows are finite or the
     observations do not vary, since then neither figure exists.
     """
-    seen, estimated = _finite_rows((observed, predicted), mask, least=2)
-    error = estimated - seen
-    spread = float(np.ptp(seen))
+    actual, estimated = _finite_rows((observed, predicted), mask, least=2)
+    error = estimated - actual
+    spread = float(np.ptp(actual))
     if spread == 0.0:
         raise InputError("the observations do not vary, so R² and NRMSE do not exist")
     rmse = float(np.sqrt(np.mean(error**2)))
-    r2 = 1.0 - float(np.sum(error**2) / np.sum((seen - seen.mean()) ** 2))
-    return Agreement(len(seen), r2, rmse / spread, rmse, float(error.mean()))
+    r2 = 1.0 - float(np.sum(error**2) / np.sum((actual - actual.mean()) ** 2))
+    return Agreement(len(actual), r2, rmse / spread, rmse, float(error.mean()))
 
 
 def mean_absolute_error(truth: ArrayLike, estimate: ArrayLike, mask: ArrayLike | None = None) -> float:
@@ -108,9 +108,9 @@ def nis_consistency(
 ) -> NisConsistency:
     """Compare `nis` (n,) with chi-square of `channels` (n,) degrees of freedom.
 
-    Rows without a channel are left out. Raises InputError when no row took a channel.
+    Rows without a channel are left out. Raises InputError when no row used a channel.
     """
-    from scipy.special import chdtri  # scipy.stats would take half a second to load
+    from scipy.special import chdtri  # scipy.stats takes half a second to load
 
     values, degrees = _finite_rows((nis, channels), mask, least=1)
     values, degrees = values[degrees > 0], degrees[degrees > 0]

@@ -1,4 +1,4 @@
-"""A machine that tells its engine's torque and not its wheels': what only the sum of the drive torques determines is estimated as a sum.
+"""A machine that logs its engine's torque, not its wheels': what only the sum of the drive torques determines is estimated as a sum.
 
 The driven wheels become one wheel, ``driven``, and the free ones another, ``undriven``; the estimator is the same. Column
 ``adhesion_driven`` is the mean of the driven wheels' adhesion, weighted by load; single wheels have no columns.
@@ -29,7 +29,7 @@ from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
 DRIVEN, UNDRIVEN = "driven", "undriven"
-"""The wheels, and the axles, that stand for all driven and all free ones."""
+"""The wheels, and the axles, that represent all driven and all free ones."""
 _SUMS = ("adhesion_driven", "net_traction_driven", "efficiency_driven", "soil_resistance")
 _LEAST = 0.02  # as the kernel: an adhesion below it divides nothing
 _NOTE = (
@@ -49,7 +49,7 @@ def by_engine(channels: Collection[str], vehicle: Vehicle) -> bool:
 
 @dataclass(frozen=True)
 class DrivenMachine:
-    """How a machine becomes one of driven wheels: ``original``, the ``channels`` of its log, how these tell the ``engine``'s torque.
+    """How a machine becomes one of driven wheels: ``original``, the ``channels`` of its log, how these give the ``engine``'s torque.
 
     Where the drive train's speed alone is measured also that ``rim`` and the speed [m/s] below which it reads 0 (``dead_band``)."""
 
@@ -61,7 +61,7 @@ class DrivenMachine:
 
     @classmethod
     def of_log(cls, whole: Recording, vehicle: Vehicle, reference: SlipReference) -> DrivenMachine:
-        """As a whole log tells; raises InputError where it lacks what its engine's torque is a share of."""
+        """From a whole log; raises InputError where it lacks the reference torque of which the engine's torque is a share."""
         assert vehicle.driveline is not None
         measured = whole.channels.get("engine_reference_torque")
         engine = EngineTorque.of(
@@ -107,7 +107,7 @@ class DrivenMachine:
 
     @property
     def together(self) -> int:
-        """How many wheels the driven one stands for."""
+        """How many wheels the driven one represents."""
         return len(self._wheels[0])
 
     @cached_property
@@ -171,18 +171,18 @@ class DrivenMachine:
         return {n: v[before:] for n, v in {**own, **kept}.items()}, drive
 
     def shows(self, name: str) -> bool:
-        """Whether a column of estimates of `vehicle` says what was measured: of free wheels their load alone, unless their speeds are."""
+        """Whether a column of estimates of `vehicle` rests on a measurement: of free wheels only the load, unless their speeds do."""
         return self.frees_measured or UNDRIVEN not in name or name.startswith("vertical_load")
 
     def _weight(self, columns: Mapping[str, Floats]) -> Floats | float:
-        """What the wheels carry (n,) [N]: the machine's weight, unless the log says that it changes."""
+        """The load on the wheels (n,) [N]: the machine's weight, unless the log has a mass that changes."""
         if not {"mass", "hitch_load"} & set(self.channels):
             return self.vehicle.mass * GRAVITY
         loads = [columns[f"vertical_load_{axle}"] for axle in self.vehicle.axle_names]
         return np.asarray(np.sum(loads, axis=0))
 
     def completed(self, columns: Mapping[str, Floats], std: Floats) -> dict[str, Floats]:
-        """The columns (n,) that change by the spread ``std`` (n,) [N m] of what the driveline takes; open where no torque stands."""
+        """The columns (n,) that widen by the SD ``std`` (n,) [N m] of the driveline's losses; NaN where no torque is known."""
         machine = self.vehicle
         force = std / self.radius(DRIVEN)
         by_adhesion, by_resistance = force / columns[f"vertical_load_{DRIVEN}"], force / self._weight(columns)
@@ -215,7 +215,7 @@ def _drive(rims: Collection[Rim]) -> Rim | None:
 
 
 def machine_of(estimates: Estimates, vehicle: Vehicle) -> Vehicle:
-    """The vehicle that the columns of the estimates speak of: ``vehicle`` (as its file has it) or, of a driveline, its wheels as one."""
+    """The vehicle that the columns of the estimates refer to: ``vehicle`` (as its file has it) or, of a driveline, its wheels as one."""
     if "driveline" not in estimates.about or vehicle.driveline is None:
         return vehicle
     made = estimates.vehicle
@@ -229,7 +229,7 @@ _REPLACED = ("wheel_speed_", "wheel_based_speed", "vertical_load_", "engine_")
 def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]:
     """A vehicle file's data of the machine with its driven wheels as one and its free ones as another.
 
-    Each has its wheels' mean radius and the sum of their equivalent masses; its axle carries their masses, where these have their mean.
+    Each has its wheels' mean radius and the sum of their equivalent masses; its axle has their masses, at their mean position.
     ``zero``: radius [m] of the driven one at zero slip and its relative SD, where the log tells them.
     """
     radii, data = wheel_radii(vehicle)[1], vehicle.to_dict()
@@ -279,7 +279,7 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
         data["wheelbase"] = groups[0][0] - rear
         if data["wheelbase"] < 0.1 * float(
             np.ptp(position)
-        ):  # the groups stand in one place: nothing shifts load between them
+        ):  # the groups are at one place: nothing shifts load between them
             data |= {"wheelbase": 1.0, "center_of_gravity_height": 0.0, "hitch_height": 0.0}
     for key in ("wheel", "track", "driveline", *(("wheelbase",) if len(groups) == 1 else ())):
         data.pop(key, None)

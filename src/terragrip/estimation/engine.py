@@ -1,4 +1,4 @@
-"""The kernel's estimator as Python sees it: settings from a vehicle, columns in, columns out."""
+"""The kernel's estimator for Python: settings from a vehicle, columns in, columns out."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ class Engine:
                 progress(last)
 
     def smooth_carry(self) -> Floats:
-        """Room for what smoothing carries from block to block."""
+        """Storage for what smoothing passes from block to block."""
         return np.zeros(lib.tg_smooth_carry(self.handle))
 
     def record(self, time: Floats, columns: Mapping[str, Floats]) -> Floats:

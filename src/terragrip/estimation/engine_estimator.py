@@ -1,4 +1,4 @@
-"""Sample by sample on a machine that tells its engine's torque: `DrivenMachine` on the last seconds, the digits of a whole log."""
+"""Sample by sample on a machine that logs its engine's torque: `DrivenMachine` on the last seconds, with the digits of a whole log."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class EngineEstimator(TractionEstimator):
 
     @property
     def places(self) -> dict[str, int]:
-        """Where in an estimate's values each column stands."""
+        """The position of each column in an estimate's values."""
         return self._places
 
     @property
@@ -87,7 +87,7 @@ class EngineEstimator(TractionEstimator):
         if not (math.isfinite(time) and time > self._tail.last) or any(map(math.isinf, row)):
             if any(map(math.isinf, row)):
                 raise unusable({**sample, "time": time}, self.given)
-            return super().update_at(time, {})  # which says what is wrong with the time
+            return super().update_at(time, {})  # which reports what is wrong with the time
         if not self.fixed:
             self._learn_engine(sample)
         self._tail.add(time, row)
@@ -122,7 +122,7 @@ class EngineEstimator(TractionEstimator):
         return Estimate(estimate.time, estimate.event, packed, self._places)
 
     def update_block(self, recording: Recording) -> Estimates:
-        """Not for this one: a whole log knows more, see :func:`terragrip.estimate`."""
+        """Not available sample by sample: it needs a whole log, see :func:`terragrip.estimate`."""
         raise InputError(
             "estimates of a bus come sample by sample", hint="estimate the whole log with terragrip.estimate"
         )

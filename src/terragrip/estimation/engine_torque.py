@@ -14,7 +14,7 @@ from terragrip.physics.driveline import torque_into_gears, torque_spread, wheel_
 from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle_parts import Driveline
 
-_HOLD = 2.0  # s that a value stands for
+_HOLD = 2.0  # s that a value is used for
 _LAGS = (0.5, 1.0)  # s: over them the ratio is compared
 _REACH = 3.0  # s: no older value is compared with
 TAIL = 2 * _HOLD + _REACH
@@ -22,10 +22,10 @@ TAIL = 2 * _HOLD + _REACH
 _SHIFT = (
     0.08  # change of the ratio that makes a shift: a step of a gearbox is 15 to 25 %, slip and noise less
 )
-_SLOWEST = 0.07  # of √(g r): slower rims tell no ratio
+_SLOWEST = 0.07  # of √(g r): slower rims do not determine the ratio
 SHARE_STD = 0.02
 """SD of a controller's torque, which is a model's, of the reference torque."""
-_FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not say (ours)
+_FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not state it (ours)
 _TORQUES = ("engine_torque", "engine_torque_share")
 
 
@@ -146,15 +146,15 @@ def driveline_torque(
     if power_std is None:
         power_std = driveline.accessory_power / 2
     std = torque_spread(speed, ratio, driveline.efficiency, engine.std, power_std)
-    stands = held(time, np.where(np.isfinite(torque), std, np.nan))
-    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio), np.nan, stands), shift)
+    std_held = held(time, np.where(np.isfinite(torque), std, np.nan))
+    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio), np.nan, std_held), shift)
 
 
 def held(time: Floats, values: Floats) -> Floats:
     """The last value (n,) at each row, NaN where it is too old."""
     last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(time)), -1))
-    stands = (last >= 0) & (time - time[last] <= _HOLD)
-    return np.where(stands, values[last], np.nan)
+    fresh = (last >= 0) & (time - time[last] <= _HOLD)
+    return np.where(fresh, values[last], np.nan)
 
 
 def earlier(time: Floats, values: Floats, lag: float) -> Floats:

@@ -1,4 +1,4 @@
-"""The rows of a recording through an estimator as it stands, and the table that they make."""
+"""The rows of a recording through an estimator in its present state, and the table that they make."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")
 CARRIED = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
-"""Channels that stand beside the estimates as they were measured."""
+"""Channels that are copied to the estimates as they were measured."""
 
 
 def run(
@@ -31,7 +31,7 @@ def run(
     notes: Callable[[], Sequence[str]] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Estimates:
-    """All rows of the recording through the estimator as it stands; ``notes``: None: those that it gives itself.
+    """All rows of the recording through the estimator in its present state; ``notes``: None: those that it gives itself.
 
     A row before a gap is not flagged (`flag_before_gaps`), as none is where samples come one by one.
     """
@@ -39,12 +39,12 @@ def run(
     out = table_of(estimator.columns, len(time))
     event = np.empty(len(time), dtype=np.uint8)
     estimator.engine.run(time, columns, out, event, progress)
-    said = notes_of(estimator, recording) if notes is None else notes()
-    return finished(estimator, recording, out, event, said, smooth=False)
+    texts = notes_of(estimator, recording) if notes is None else notes()
+    return finished(estimator, recording, out, event, texts, smooth=False)
 
 
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
-    """Time and those channels that the estimator looks at, each contiguous."""
+    """Time and those channels that the estimator uses, each contiguous."""
     wanted, channels = estimator.engine.slots_in, recording.channels
     if estimator.track is not None:
         channels = {**channels, "angular_velocity_z": estimator.track.at("turn", recording.time)}
@@ -78,7 +78,7 @@ def finished(
 
 
 def carried_channels(recording: Recording, estimator: TractionEstimator) -> tuple[str, ...]:
-    """The channels that stand beside the estimates as they were measured."""
+    """The channels that are copied to the estimates as they were measured."""
     own = ("drawbar_force",) if estimator.method == SLIP_ONLY.name else ()
     return tuple(n for n in (*own, *CARRIED, *recording.references) if n in recording.channels)
 

@@ -1,7 +1,7 @@
 """Noise and held channels learned while the rows come in, by the functions that learn them from a whole log.
 
-As a log's survey (`terragrip.recording.survey`) takes every 2^k-th chunk of its rows, so does this of the rows so far, with shorter
-chunks: after 1, 2, 3, 4, 5, 7, 9, 13, 17 ... chunks the kept ones stand for the whole drive, and what they show is reported.
+As a log's survey (`terragrip.recording.survey`) samples every 2^k-th chunk of its rows, so does this of the rows so far, with shorter
+chunks: after 1, 2, 3, 4, 5, 7, 9, 13, 17 ... chunks the kept ones represent the whole drive, and what they show is reported.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Learned:
         return changes
 
     def apply(self, estimator: TractionEstimator) -> None:
-        """From the next sample on. What was known before stays where this says nothing: a machine that stands shows no noise."""
+        """From the next sample on. Where this shows nothing, earlier values stay: a machine at standstill shows no noise."""
         known = {name: sd for name, sd in estimator.noise.items() if name not in estimator.guessed}
         estimator.set_noise({**known, **self.noise}, {**estimator.held, **self.held})
 
@@ -90,7 +90,7 @@ class SettingsLearner:
         return noise, {name: period for name, period in estimator.held.items() if name not in self._held}
 
     def add(self, time: float, values: Mapping[str, float]) -> Learned | None:
-        """A row that the estimator has taken; what the rows so far tell, where this one ends a chunk that is kept."""
+        """Add a row that the estimator has processed; returns what the rows so far show, where this one ends a chunk that is kept."""
         if self._rows and (time - self._began >= SECONDS or self._rows >= ROWS):
             learned = self._close()
             self._append(time, values)

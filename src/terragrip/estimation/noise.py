@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 DELAY = "ground_speed_delay"
-"""The name among the sensors' SDs of that of the ground speed's delay [s]; 0 where nothing tells it."""
+"""The name among the sensors' SDs of that of the ground speed's delay [s]; 0 where nothing shows it."""
 
 _SENSOR_OF = {
     "acceleration_x": "acceleration",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def about_recording(recording: Recording) -> dict[str, Any]:
     """The log of a table: source and SHA-256, the clock time of its first row (``start``) and of its time 0 (``time_zero``) where
-    it says them, and the profile that it was read by (a list, of several)."""
+    it has them, and the profile that it was read by (a list, of several)."""
     about: dict[str, Any] = {"source": recording.source, "sha256": recording.sha256}
     zero = recording.clock_zero
     if zero is not None:

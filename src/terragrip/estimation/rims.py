@@ -20,7 +20,7 @@ from terragrip.recording.schema import has_torque
 from terragrip.vehicle import Vehicle
 
 DRIVE = "drive"
-"""Name of the wheel that stands for all driven ones, where only the drive train's speed is measured."""
+"""Name of the wheel that represents all driven ones, where only the drive train's speed is measured."""
 
 _RADIUS = 0.02  # relative SD of a radius that the vehicle file gives without one
 

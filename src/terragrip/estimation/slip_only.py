@@ -52,7 +52,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None
         rims.append(at_zero(rim, at) if learns and at is not None else rim)
         remedied = any(REMEDY in note for note in notes)  # which once is enough for all wheels
-        notes += [one.replace(f": {REMEDY}", "") if remedied else one for one in _said(rim, at, learns)]
+        notes += [one.replace(f": {REMEDY}", "") if remedied else one for one in _notes(rim, at, learns)]
     if "wheel_based_speed" in log.channels and not any(rim.wheel == DRIVE for rim in rims):
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)
@@ -68,7 +68,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     return SlipReference(tuple(rims), zero, band, tuple(notes))
 
 
-def _said(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
+def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
     """Sentences on the zero of slip of a rim."""
     what = "the drive" if rim.wheel == DRIVE else f"wheel {rim.wheel}"
     if zero is None:

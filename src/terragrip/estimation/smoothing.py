@@ -1,4 +1,4 @@
-"""A backward pass over a whole recording: every row then knows the rows after it (Rauch, Tung and Striebel 1965).
+"""A backward pass over a whole recording: every row then also uses the rows after it (Rauch, Tung and Striebel 1965).
 
 Memory stays bounded. The forward pass keeps a snapshot every few thousand rows and puts each block aside; then, from the last block
 to the first, a restored estimator writes the records of some rows and they are smoothed. All blocks but the newest wait on disk.

@@ -147,26 +147,26 @@ def _consistency(tally: Tally) -> list[str]:
 
 def _assumed(tally: Tally) -> list[str]:
     """What the estimates rest on that the log does not show."""
-    vehicle, said = tally.about.get("vehicle", {}), []
+    vehicle, assumptions = tally.about.get("vehicle", {}), []
     given = {name: value for name, value in (vehicle.get("uncertainty") or {}).items() if value}
     if given:
-        said.append(
+        assumptions.append(
             "considered as unknown "
             + ", ".join(f"{name} ±{_short(name, value)}" for name, value in given.items())
         )
     elif tally.about.get("method") != "slip-only":
-        said.append(
+        assumptions.append(
             "no constant is considered as unknown, so the intervals cover the sensors' noise alone ('uncertainty' in the vehicle file)"
         )
     if vehicle and not vehicle.get("calibration"):
-        said.append("the vehicle is not calibrated")
+        assumptions.append("the vehicle is not calibrated")
     held = tally.about.get("settings", {}).get("held", {})
     if held:
-        said.append(
+        assumptions.append(
             "repeated values are missing ones, of "
             + ", ".join(f"{n} ({1 / p:.3g} Hz)" for n, p in held.items())
         )
-    return [f"Assumed: {'; '.join(said)}."] if said else []
+    return [f"Assumed: {'; '.join(assumptions)}."] if assumptions else []
 
 
 def _short(name: str, value: float) -> str:
@@ -180,8 +180,8 @@ def _short(name: str, value: float) -> str:
         "acceleration_bias": " m/s²",
         "tire_rolling_resistance": "",
     }
-    said = value if name in unit else 100 * value
-    return f"{float(f'{said:.2g}'):g}{unit.get(name, ' %')}"
+    shown = value if name in unit else 100 * value
+    return f"{float(f'{shown:.2g}'):g}{unit.get(name, ' %')}"
 
 
 def _next(tally: Tally, notes: tuple[str, ...], output: str | None) -> str:

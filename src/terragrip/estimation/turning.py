@@ -1,4 +1,4 @@
-"""The rate of turn of a log whose sensors do not give it: each wheel's slip is against the speed of its own hub, which a turn moves."""
+"""The yaw rate of a log without a sensor for it: a wheel's slip is relative to its hub's speed, which depends on the turn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
 
-_CALM = 4.0  # s that a rate of turn by positions is taken over
+_CALM = 4.0  # s over which a yaw rate is taken from positions
 _MOVING = 0.1  # m/s
 _WINDOW = 2.0  # s
 _TURNING = 0.04  # relative difference of the rims from side to side
@@ -22,7 +22,7 @@ _MUCH = 0.1  # share of the driving
 
 
 def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track | None, list[str]]:
-    """The motion by the positions, where no sensor tells how fast the machine turns, and a sentence on it.
+    """The motion by the positions, where no sensor measures how fast the machine turns, and a sentence on it.
 
     ``sample``: rows of the log, by which it is judged whether the machine turned where nothing tells how fast.
     """

@@ -30,9 +30,9 @@ _EVENT_COLORS = {"stuck": VERMILLION, "immobilization": ORANGE, "push": BLUE}
 
 def html_of(estimates: Estimates) -> str:
     """What was driven, the medians by wheel, and the notes."""
-    said = estimates.summary().splitlines()[0]
+    headline = estimates.summary().splitlines()[0]
     if estimates.start is not None and len(estimates):
-        said += f", from {clock_times(estimates.time[:1], estimates.start).item():%Y-%m-%d %H:%M:%S} UTC"
+        headline += f", from {clock_times(estimates.time[:1], estimates.start).item():%Y-%m-%d %H:%M:%S} UTC"
     middle = medians(estimates, estimates.event_codes == 0)
 
     def cell(name: str) -> str:
@@ -46,7 +46,7 @@ def html_of(estimates: Estimates) -> str:
         if any(f"{quantity}_{wheel}" in estimates for wheel in estimates.wheels):
             title = f"{quantity.replace('_', ' ')} [–]"
             rows.append((title, *(cell(f"{quantity}_{wheel}") for wheel in estimates.wheels)))
-    caption = f"{said}; medians ± SD while moving without an event"
+    caption = f"{headline}; medians ± SD while moving without an event"
     return html_table(["", *estimates.wheels], rows, caption) + html_notes(estimates.notes)
 
 

@@ -1,9 +1,9 @@
-"""The zero of slip: the ratio of ground speed to wheel speed in light work, found in a log in one way for all who ask.
+"""The zero of slip: the ratio of ground speed to wheel speed in light work, determined from a log in one way for all callers.
 
-Speeds tell slip only against a condition that is called zero (ASABE S296: "zero condition"): driving without load on firm ground.
+Speeds give slip only relative to a condition that is called zero (ASABE S296: "zero condition"): driving without load on firm ground.
 A log of work holds such stretches too, on the headland and on the road. Over windows of some seconds the ratio then has more than
 one mode; the mode of the highest ratio is light work. Where there is one mode only, or the highest runs far behind the supposed radius,
-field work cannot be distinguished from light work, and that is said. Wheels slip there, too, to carry the vehicle alone, on soft ground
+field work cannot be distinguished from light work, which is reported. Wheels slip there, too, to move the vehicle alone, on soft ground
 by a per cent or two: that is in the interval, and a road, where it is least, counts before light work in the field. The modes are
 Gaussians beside a uniform floor, fitted by expectation and maximisation, their number by the Bayesian information criterion (Schwarz
 1978). (R), our own construction.
@@ -30,7 +30,7 @@ WINDOW = 5.0
 FEWEST = 8
 """Windows that are needed: 40 s."""
 UNTOLD = 0.03
-"""Relative SD of a radius that nothing tells but the machine itself: worn or other tires, other pressure."""
+"""Relative SD of a radius that no log shows, only the machine: worn or other tires, other pressure."""
 
 _ALIKE: Mapping[str, float] = MappingProxyType({})  # wheels of one radius
 REMEDY = "also record 40 s without load (headland, road), or state which rows are without load (terragrip calibrate --light FROM:TO)"
@@ -178,7 +178,7 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
         weight = density / total[:, None]
         held = np.maximum(weight.sum(axis=0), 1e-9)
         share = held / held.sum()
-        share[-1] = min(share[-1], _STRAY)  # a floor that takes whole modes would be none
+        share[-1] = min(share[-1], _STRAY)  # a floor that removes whole modes would be none
         share /= share.sum()
         mean = (weight[:, :-1] * ratio[:, None]).sum(axis=0) / held[:-1]
         square = (weight[:, :-1] * (ratio[:, None] - mean) ** 2).sum(axis=0) / held[:-1]

@@ -24,7 +24,7 @@ LENGTH = 30.0
 LEAST = 4
 """Fewest blocks of a stretch: 2 s."""
 LEAST_FOR_WEIGHTS = 120
-"""Blocks (a minute) that tell how alike neighbours are; a shorter drive takes the usual figure."""
+"""Blocks (a minute) that determine the correlation of neighbours; a shorter drive uses the usual value."""
 _JUMP = 2
 """PELT tries every second block; where a change lies between its neighbours is then weighed block by block."""
 _AT_ONCE = 512

@@ -1,7 +1,7 @@
 """The conjugate model of a signal on one ground: normal, its mean and variance unknown, normal-inverse-gamma before (Murphy 2007).
 
 Neighbouring blocks repeat each other: a block counts for `weight` of an independent one, in the update and in the likelihood alike.
-Change points while driving and afterwards stand on this one model.
+Change points while driving and afterwards use this one model.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Model:
         )
 
     def evidence(self, count: Floats, total: Floats, square: Floats) -> Floats:
-        """Log evidence of stretches, summed over signals: from how many blocks tell each signal, their sums and sums of squares, all
+        """Log evidence of stretches, summed over signals: from the number of blocks with each signal, their sums and sums of squares, all
         (stretches, signals)."""
         n = count * self.weight
         kappa, alpha = self.count + n, self.shape + n / 2

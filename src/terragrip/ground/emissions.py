@@ -1,4 +1,4 @@
-"""How likely a block of a drive is on each known soil, and on a soil that nobody knows.
+"""How likely a block of a drive is on each known soil, and on an unknown soil.
 
 A known soil is its curve, its resistance and its roughness (the library's signature); the estimates' own standard deviations widen its law
 block by block. Densities are of the same quantities for all soils: rho_s, mu, and the roughness of both.
@@ -31,7 +31,7 @@ from terragrip.soil.library import Soil
 from terragrip.soil.signature import Signature, curve_error, signature_in
 
 _CURVE_SPREAD = 0.10
-"""SD of mu about its curve, relative, where a library says nothing of it."""
+"""SD of mu about its curve, relative, where a library does not state it."""
 
 
 @dataclass(frozen=True)

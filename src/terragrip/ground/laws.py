@@ -1,4 +1,4 @@
-"""Small laws that emissions are made of: normal densities, a broad law for strays, and tempering."""
+"""Small laws that emissions are made of: normal densities, a broad law for outliers, and tempering."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def tempered(logs: Floats, seconds: float) -> Floats:
 
 
 def mixed(mine: Floats, broad: Floats) -> Floats:
-    """Log density of a law with strays."""
+    """Log density of a law with outliers."""
     return np.asarray(np.logaddexp(np.log(1 - _STRAY) + mine, np.log(_STRAY) + broad))
 
 

@@ -27,7 +27,7 @@ _RUNS = ("_mean", "_count", "_shape", "_scale")
 
 @dataclass(frozen=True)
 class OnlineSettings:
-    """`length` [m]: mean way on one ground; `threshold`: probability at which a change is reported; `recent` [s]: how far back to look."""
+    """`length` [m]: mean distance on one ground; `threshold`: probability at which a change is reported; `recent` [s]: span searched."""
 
     length: float = 30.0
     threshold: float = 0.8
@@ -36,7 +36,7 @@ class OnlineSettings:
 
 
 class OnlineChanges:
-    """Takes blocks in order and tells of changes; `probability` is that of a change within the last `recent` seconds."""
+    """Receives blocks in order and reports changes; `probability` is that of a change within the last `recent` seconds."""
 
     def __init__(self, settings: OnlineSettings | None = None) -> None:
         self.settings = settings or OnlineSettings()
@@ -51,7 +51,7 @@ class OnlineChanges:
         self.probability = 0.0
 
     def update(self, blocks: Blocks) -> list[Change]:
-        """Take blocks, one or many; returns the changes that they tell of."""
+        """Add blocks, one or many; returns the changes that they show."""
         result = []
         signals = signals_of(blocks, self.settings.names)
         for k in range(len(blocks)):
@@ -92,14 +92,14 @@ class OnlineChanges:
         self._begin = np.append(self._begin, start)
         for name, prior in zip(_RUNS, self._prior, strict=True):
             setattr(self, name, np.vstack([getattr(self, name), prior]))
-        seen = np.isfinite(x)
-        if seen.any():
-            self._learn(np.where(seen, x, 0.0), np.where(seen, self._weight, 0.0))
+        finite = np.isfinite(x)
+        if finite.any():
+            self._learn(np.where(finite, x, 0.0), np.where(finite, self._weight, 0.0))
         self._prune()
         return self._report(end)
 
     def _learn(self, x: Floats, weight: Floats) -> None:
-        """Weigh the runs by what they predicted, then take the block into each."""
+        """Weight the runs by their predictions, then add the block to each."""
         off, degrees = x - self._mean, 2 * self._shape
         square = self._scale * (self._count + 1) / (self._shape * self._count)
         logs = gammaln((degrees + 1) / 2) - gammaln(degrees / 2) - 0.5 * np.log(degrees * np.pi * square)

@@ -17,13 +17,13 @@ from terragrip.soil.blocks import Blocks
 
 @dataclass(frozen=True)
 class Chain:
-    """The prior: mean length of one soil [m], and the share that a soil nobody knows has among the new ones."""
+    """The prior: mean length of one soil [m], and the share of unknown soils among the new ones."""
 
     length: float = 8.0
     unknown: float = 0.1
 
     def start(self, states: NDArray[np.int64]) -> Floats:
-        """Probabilities before anything is seen (states,): known soils alike, states of one soil alike. `states`: of `Emissions`."""
+        """Prior probabilities (states,): known soils equally likely, states of one soil equally likely. `states`: of `Emissions`."""
         soils = int(states[-1])
         unknown = self.unknown if soils else 1.0
         each = np.append(np.full(soils, (1 - unknown) / max(soils, 1)), unknown)
@@ -66,7 +66,7 @@ class ForwardFilter:
 
 @dataclass(frozen=True)
 class Forward:
-    """A forward pass: filtered probabilities and relative likelihoods (blocks, states), the chance of a soil drawn anew before each block
+    """A forward pass: filtered probabilities and relative likelihoods (blocks, states), the chance of a new soil before each block
     (blocks,), the law that it is drawn from and the soil of each state (states,)."""
 
     filtered: Floats

@@ -1,6 +1,6 @@
 """What a change of the ground shows in: signals of blocks that the driver's own doing (speed, pull, tool) leaves alone.
 
-Slip and adhesion move together with the pull on one and the same ground. So the signal is where they stand to each other: the scale a of
+Slip and adhesion move together with the pull on one and the same ground. So the signal is their relation: the scale a of
 mu = a g(s). With it rho_s, and how much rho_s and mu vary within a block. Slip and adhesion themselves are offered for those who want them.
 """
 
@@ -15,14 +15,14 @@ from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import FLOOR, Blocks
 
 GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
-"""The signals that tell of the ground alone. `_sd`: ln of the SD within a block."""
+"""The signals that depend on the ground only. `_sd`: ln of the SD within a block."""
 SIGNALS = (
     *GROUND, "slip", "adhesion", "curve_a", "slip_sd", "soil_resistance_std", "adhesion_std", "slip_std",
 )  # fmt: skip
 """All signals on offer. `curve_a`: the kernel's curve while driving, which lags by seconds; `_std`: ln of the estimates' own SD."""
 
 _SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
-"""Before mu is seen a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
+"""Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ LAWS: dict[str, Law] = {
 
 
 def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
-    """Signals (blocks, names); NaN where a block tells nothing. Raises ValueError on a name that is none of `SIGNALS`."""
+    """Signals (blocks, names); NaN where a block shows nothing. Raises ValueError on a name that is none of `SIGNALS`."""
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
         "soil_resistance": blocks.resistance,
@@ -81,7 +81,7 @@ def _log_sd(variance: Floats) -> Floats:
 
 
 def curve_scale(slip: Floats, adhesion: Floats) -> Floats:
-    """a of mu = a g(s), g the paper's prototype (eq. 8), drawn towards 0.85 where slip is too small to tell it; any shape."""
+    """a of mu = a g(s), g the paper's prototype (eq. 8), drawn towards 0.85 where slip is too small to determine it; any shape."""
     shape = CURVES["exponential"].value(slip, {"a": 1.0})
     ridge = (_ADHESION_SD / _SCALE_SD) ** 2
     return np.asarray((adhesion * shape + ridge * _SCALE) / (shape**2 + ridge))

@@ -1,4 +1,4 @@
-"""The soil that nobody knows: any soil on a grid of what soils can be.
+"""The unknown soil: any soil on a grid of possible soils.
 
 One broad law would not do: over a stretch, a known soil that fits badly has the better density in every block than a law that is broad
 in every block. A cell of the grid is as sharp as a known soil is, so that the cell which fits wins over known soils that do not. That

@@ -49,7 +49,7 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
 
 
 def _as_it_is(block: Recording, lag: Lag | None) -> Recording:
-    """A block of a log with what its lag tells, and a note where that is too uncertain to set right."""
+    """A block of a log, not shifted, with its delay, and a note where the lag is too uncertain to correct."""
     block = replace(block, delay=delay_of(lag))
     return block.with_notes(_doubt(lag)) if lag is not None and lag.is_of_the_clock else block
 
@@ -70,7 +70,7 @@ class _Shift:
 
     @classmethod
     def by(cls, lag: Lag, time: Floats, columns: dict[str, Floats]) -> _Shift:
-        """The shift by a lag, with what the first rows of a log say of its channels."""
+        """The shift by a lag, with the channels' properties from the first rows of a log."""
         ground = columns["ground_speed"]
         when, kept = time[np.isfinite(ground)], ground[np.isfinite(ground)]
         late = [

@@ -36,7 +36,7 @@ _RESTORED = 0.4  # of the difference, at most, is left when the masses are excha
 def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
     """A sentence on two driven axles whose thrusts, at like slip, would be in proportion to each other's masses.
 
-    Other errors of torques and speeds look alike: use this only where no other was found.
+    Other errors of torques and speeds look the same: use this only where no other was found.
     """
     names = list(vehicle.axles)
     driven = [k for k, axle in enumerate(vehicle.axles.values()) if axle.driven]

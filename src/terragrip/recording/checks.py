@@ -65,7 +65,7 @@ _OF_VALUES = (
     "waarde",
     "reading",
 )
-_NARROW = 6  # columns: time, unit, source and so on may stand beside these two
+_NARROW = 6  # columns: time, unit, source and so on may be beside these two
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 

@@ -181,7 +181,7 @@ def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
 
 
 def _refuse_thousands(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> None:
-    """Raise InputError where the points in a column of texts may stand between thousands."""
+    """Raise InputError where the points in a column of texts may separate thousands."""
     cells = {row: cell.strip() for row, cell in enumerate(column.tolist()) if isinstance(cell, str)}
     if not has_thousands(list(cells.values()), "."):
         return

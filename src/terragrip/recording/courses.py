@@ -52,7 +52,7 @@ def lag_of(late: Floats, early: Floats, step: float, within: float) -> tuple[flo
     size = np.sqrt(
         np.maximum(energy[len(early) :] - energy[: len(late) - len(early) + 1], 0.0) * np.sum(early**2)
     )
-    # Not np.correlate: for each lag of a long log BLAS would wake its threads, which takes .2 s in all on a busy machine.
+    # Not np.correlate: for each lag of a long log BLAS wakes its threads, .2 s in all on a busy machine.
     products = np.einsum("kj,j->k", sliding_window_view(late, len(early)), early)
     found = products / np.where(size > 0, size, np.inf)
     best = int(np.argmax(found))

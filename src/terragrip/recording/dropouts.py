@@ -69,7 +69,7 @@ def _torques(recording: Recording) -> list[str]:
 
 
 def _blinks(recording: Recording) -> list[str]:
-    """A sentence on each speed that is 0 for single samples while another speed goes on: zeros for values that were not there."""
+    """A sentence on each speed that is 0 for single samples while another speed continues: zeros in place of missing values."""
     speeds = {n: v for n, v in recording.channels.items() if n == "ground_speed" or n.startswith("wheel_")}
     ground, notes = speeds.get("ground_speed"), []
     rims = [v for n, v in speeds.items() if n != "ground_speed" and np.isfinite(v).any()]

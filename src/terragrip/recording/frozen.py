@@ -105,7 +105,7 @@ def _range(values: Floats) -> float:
 def _repeats(
     name: str, time: Floats, values: Floats, others: list[Floats], *, forces: bool = False
 ) -> list[str]:
-    """A sentence on the longest run of one value while others change much. Speeds that are 0 may stand; ``forces`` that are 0 may be
+    """A sentence on the longest run of one value while others change much. Speeds may stay at 0; ``forces`` that are 0 may be
     switched off, and at their limits be as great as they can."""
     when, what = known_part(time, values)
     if not others or not may_last(when, what) or is_one_value(what):

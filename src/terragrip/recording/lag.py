@@ -39,7 +39,7 @@ STIFFNESS = (
     2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
 )
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
-_USUAL = 0.1  # s, SD of a receiver's delay before a log tells anything of it (ours): receivers filter
+_USUAL = 0.1  # s, prior SD of a receiver's delay, before a log shows it (ours): receivers filter
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | None:
-    """The lag of one file's ground speed behind its wheel speeds (n,), if they tell one; it need not be certain.
+    """The lag of one file's ground speed behind its wheel speeds (n,), if they show one; it need not be certain.
 
     The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """

@@ -2,7 +2,7 @@
 
 Over windows of a second, averaged over the same stretch for all, an accelerometer along the vehicle reads dv/dt + g sin(pitch), and the
 wheels' thrust Σ M/r less the drawbar force is m times that plus a resistance (physics.md 1). With a wrong sign, unit, gear ratio or mass
-they are proportional by a factor other than 1. Thrust and accelerometer agree best, since both see a slope; the change of ground speed
+they are proportional by a factor other than 1. Thrust and accelerometer agree best, as both include the slope; the change of ground speed
 then decides which of them is wrong.
 """
 

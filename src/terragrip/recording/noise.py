@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 _FEWEST = 20
 _ENOUGH = 20_000  # third differences: their median is then known to a per cent
 _MAD_TO_SD = 1.482602218505602  # of a normal distribution
-_ROWS, _SAMPLES = 1000, 500  # of eight parts of a channel, and of those together: they tell a resolution
+_ROWS, _SAMPLES = 1000, 500  # of eight parts of a channel, and of those together: they show a resolution
 _RESTLESS = 0.1  # share of values unlike the one before: a channel that changes less often has set-points
 _NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
 

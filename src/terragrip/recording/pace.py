@@ -1,4 +1,4 @@
-"""A clock in another unit, and a ground speed that is the wheels' own: what speeds say of both; sentences for the user, never errors."""
+"""A clock in another unit, and a ground speed that is the wheels' own: what speeds show of both; sentences for the user, never errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _GRIP = 15.0  # m/s²: no tyre or track on the ground gives as much
 _LAGS = (4, 16, 64)  # rows over which a speed changes
 _OFTEN = 0.99  # of the changes are slower (right logs: by 2.5 m/s² at most, comma2k19's car among them)
-_ENOUGH = 4000  # rows that are looked at
+_ENOUGH = 4000  # rows that are examined
 _OUTRUN = 3.0  # the positions' spread over the way driven
 _SPREAD = 20.0  # m
 _CLOCK = "time may not be in seconds: give its unit in a profile, 'time: {from: ..., unit: min}'"
@@ -46,7 +46,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     some = rows[:: max(1, len(rows) // _ENOUGH)]
     way = max(
         _way(time[some], speed[some]), _way(time[some], _mean(rims, some))
-    )  # where either has gaps, the other knows
+    )  # where either has gaps, the other has values
     spread = _spread(recording, rows)
     if spread > max(_SPREAD, _OUTRUN * way):
         return [
@@ -74,7 +74,7 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     rest = speed - turning @ np.linalg.lstsq(turning, speed, rcond=None)[0]
     if float(np.sqrt(np.mean(rest**2))) > _COPY * size:
         return []
-    # last, for it takes a fifth of an estimate's time
+    # last, since it needs a fifth of an estimate's time
     if (white_noise(*measured_part(recording.time, ground)) or 0.0) < _SHARED * size:
         return []
     return [
@@ -84,7 +84,7 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 
 def _whole(time: Floats, values: Floats) -> Floats:
-    """Values (n,) on straight lines between those that are known; a sum tells soonest that all are."""
+    """Values (n,) on straight lines between those that are known; a sum shows soonest that all are known."""
     return values if np.isfinite(values.sum()) else filled(time, values)
 
 
@@ -112,9 +112,9 @@ def _changes(time: Floats, speed: Floats, rims: list[tuple[float, Floats]]) -> f
         if lag == 1:
             scatter = 3 * median(both)
             continue
-        passed = median(time[rows + lag] - time[rows])
+        elapsed = median(time[rows + lag] - time[rows])
         fast = quantile(np.where(a * b > 0, both, 0.0), _OFTEN)
-        most = max(most, (fast - scatter) / passed)
+        most = max(most, (fast - scatter) / elapsed)
     return most
 
 

@@ -20,7 +20,7 @@ _ALIKE = 0.7  # correlation from which two signals are proportional
 _SURE = 3.0  # standard errors
 _SCALE = 1.3  # an accelerometer's own scale is 2 % off at most
 _LATE = 0.15  # s, and half a window of slow samples: filters
-_FAR = 1.0  # windows: beyond, the first order says nothing
+_FAR = 1.0  # windows: beyond it, the first order does not hold
 _CERTAIN = 4.0  # standard errors of a lag
 _BLOCKS = 10  # of correlated windows, for the jackknife
 _CAUSES = (
@@ -36,14 +36,14 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     """Sentences on a pitch of another sign, axis, scale or instant than the accelerometer's; ``forward`` (n,) [m/s²] is its reading."""
     if means.climb is None:
         return []
-    seen = forward - means.change
-    fit = means.fit(seen, means.climb)
+    observed = forward - means.change
+    fit = means.fit(observed, means.climb)
     if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
         return [
             "pitch falls where the accelerometer shows a climb: nose up is positive; write 'sign: -1' for it in the profile."
         ]
     roll = recording.channels.get("roll")
-    if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(seen, means.of(np.sin(roll))).alike):
+    if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(observed, means.of(np.sin(roll))).alike):
         return [
             "The accelerometer shows climbs that vary with roll and not with pitch: the two may be exchanged."
         ]
@@ -55,14 +55,14 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
         distance, cause = min((abs(float(np.log(times / size))), text) for size, text in _CAUSES)
         reason = f"it may be {cause} for it in the profile" if distance < 0.25 else "check its unit and scale"
         return [f"pitch is {times:.2g} times the climb that the accelerometer shows: {reason}."]
-    return _late_warnings(recording, means, means.climb, seen)
+    return _late_warnings(recording, means, means.climb, observed)
 
 
-def _late_warnings(recording: Recording, means: Means, climb: Floats, seen: Floats) -> list[str]:
-    """A pitch that is late: to first order the climb seen is the pitch and its rate times the lag."""
+def _late_warnings(recording: Recording, means: Means, climb: Floats, observed: Floats) -> list[str]:
+    """A pitch that is late: to first order the measured climb is the pitch and its rate times the lag."""
     plain = STANDARD_GRAVITY * window_means(np.sin(recording.channels["pitch"]), means.place, means.count)
     rate = np.r_[np.nan, (plain[2:] - plain[:-2]) / (2 * means.length), np.nan][means.rows]
-    design = np.column_stack([np.ones(len(seen)), climb, rate, seen])
+    design = np.column_stack([np.ones(len(observed)), climb, rate, observed])
     design = design[np.isfinite(design).all(axis=1)]
     block = np.arange(len(design)) * _BLOCKS // len(design)
 

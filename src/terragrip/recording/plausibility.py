@@ -49,7 +49,7 @@ _RATIOS = (
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
-_FINEST = 0.05  # s: no check looks finer
+_FINEST = 0.05  # s: no check has a finer resolution
 _ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
 _ONE = 1.15  # quartiles of one ratio

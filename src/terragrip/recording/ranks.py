@@ -1,6 +1,6 @@
 """Median and quantile as NumPy has them, to the last digit, of finite values.
 
-NumPy finds one rank several times faster than the two or three for which `np.median` and `np.quantile` ask at once.
+NumPy finds one rank several times faster than the two or three that `np.median` and `np.quantile` request at once.
 """
 
 from __future__ import annotations

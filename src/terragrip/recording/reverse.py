@@ -28,7 +28,7 @@ _WRONG = "in reverse turns the slips of both sides are wrong."
 
 
 def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence where the ground speed stays positive while the wheels turn backward, or where both do and a gyroscope tells of it."""
+    """A sentence where the ground speed stays positive while the wheels turn backward, or where both do and a gyroscope shows it."""
     channels, time = recording.channels, recording.time
     known = [w for w in vehicle.wheels if np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any()]
     ground = channels.get("ground_speed")

@@ -39,7 +39,7 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
     """Sentences on wheels of a wrong sign or radius, and on torques of a wrong sign or scale. ``turn`` (n,) [rad/s], left positive: by a
     sensor.
 
-    Without one the vehicle goes straight ahead where all its rims say so; what they say of each other is then not asked.
+    Without one the vehicle drives straight ahead where all its rims agree; differences between them are then not checked.
     """
     backward = _backward_warnings(recording, vehicle)
     drive = (
@@ -61,7 +61,7 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
 def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
     """Torques that oppose their wheels' slip in turns, on a vehicle whose sides are driven against each other there.
 
-    Other errors of speeds, torques and turn look alike: use this only where no other was found.
+    Other errors of speeds, torques and yaw rate look the same: use this only where no other was found.
     """
     drive = None if turn is None else _Drive.of(recording, vehicle, turn)
     if drive is None:

@@ -14,7 +14,9 @@ DRIVING = 0.3
 """Of the speed that a twentieth of the drive exceeds."""
 
 _GAP, _APART = 1.0, 3.0  # s, and times the usual distance of samples
-_LOOKS = 8  # within `LONG`: a value that is repeated for so long stands at half of them in succession
+_LOOKS = (
+    8  # within `LONG`: samples; a value that is repeated for so long is found at half of them in succession
+)
 _FEW = 4000  # rows that show how far rows are apart
 
 
@@ -34,7 +36,7 @@ def longest(time: Floats, rows: Bools, known: Bools) -> tuple[float, float] | No
 
 
 def may_last(when: Floats, what: Floats) -> bool:
-    """Whether a value may be repeated for `LONG`: a quick look at some of the samples (n,)."""
+    """Whether a value may be repeated for `LONG`: a quick check of some of the samples (n,)."""
     if len(when) < _LOOKS:
         return False
     every = max(1, len(when) // _FEW)

@@ -203,14 +203,14 @@ class Recording:
                 raise self._unfit(name, f"the vehicle has no wheel {owner}", f"its wheels are {known}")
         for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
             if wheel not in self.wheels:
-                seen = (
+                evidence = (
                     f"the log has wheel speeds for {', '.join(self.wheels)}; the vehicle has wheels {known}"
                 )
                 fix = (
                     "name them alike" if driven else "map the ground speed over the radius of this free wheel"
                 )
                 page = "vehicle#signals-that-are-missing"
-                raise self._unfit(f"wheel_speed_{wheel}", "is missing", f"{seen}; {fix}", page)
+                raise self._unfit(f"wheel_speed_{wheel}", "is missing", f"{evidence}; {fix}", page)
             if driven and f"drive_torque_{wheel}" not in self.channels:
                 hint = "add it, or say 'driven: false' for its axle in the vehicle file"
                 problem = f"is missing, but the wheel {wheel} is driven"

@@ -1,7 +1,7 @@
 """Torques without a sign while the vehicle brakes or drives backward: sentences for the user, never errors.
 
 Converters that log the size of a current, and meters of power, have no sign. The wheels' thrust is the pull, the force that moves the mass,
-and a resistance (physics.md 1). Where the first two say that the wheels must brake, a thrust of that size with the other sign closes the
+and a resistance (physics.md 1). Where the first two show that the wheels must brake, a thrust of that size with the other sign closes the
 balance, and the logged one does not.
 """
 
@@ -32,7 +32,7 @@ _AS_HARD = 0.5  # of the braking thrust, with the other sign: a motor that is of
 
 
 def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence where no torque is ever below 0 and the motion says that the wheels braked, or drove backward, as hard as they pulled."""
+    """A sentence where no torque is ever below 0 and the motion shows that the wheels braked, or drove backward, as hard as they pulled."""
     radii, channels = driven_radii(vehicle), recording.channels
     names = [f"drive_torque_{wheel}" for wheel in radii]
     ground = channels.get("ground_speed")

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-_MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground carries
-_LEAST = 0.02  # of the weight: a thrust that is hardly ever exceeded; tires on a road take .01, and starts more (right logs: .07 at least)
+_MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground supports
+_LEAST = 0.02  # of the weight: a thrust that is hardly ever exceeded; tires on a road need .01, and starts more (right logs: .07 at least)
 _BRAKING = 0.06  # of the weight: a mean that brakes a drive down a 10 % grade throughout
 _WITHIN = 2.0  # s, the largest lag searched
 _MOVING = 0.3  # of the rims' speed that a twentieth of the drive exceeds
@@ -35,7 +35,7 @@ _LAG = 0.2  # s, and two samples: tyres and filters cause .1, rarely .15
 _UNSEEN_LAG = 0.3  # s, where a tool may pull unmeasured: an engine's governor answers it within .2
 _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
-_FORCES = {"kN": 1e3, "daN": 10.0, "lbf": 4.448}  # N; daN stands for the kilogram's weight, too
+_FORCES = {"kN": 1e3, "daN": 10.0, "lbf": 4.448}  # N; daN is used for the kilogram's weight, too
 _FACTOR = 1.5
 
 

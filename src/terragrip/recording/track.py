@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 WINDOW = 2.0
-"""Length [s] of the stretch that a parabola is laid through; five fixes at least. Longer: less noise, and turns rounded off."""
+"""Length [s] of the stretch to which a parabola is fitted; five fixes at least. Longer: less noise, and turns rounded off."""
 
 _SLOWEST = 0.3  # m/s: slower, a course is noise
 _VAGUE_TURN = 0.03  # rad/s, and
@@ -46,7 +46,7 @@ class Track:
 
     @cached_property
     def grade(self) -> Floats:
-        """Grade (n,) [rad, uphill]; it takes longer than all the rest, and is seldom needed."""
+        """Grade (n,) [rad, uphill]; slower than all the rest, and seldom needed."""
         found = _grade(self.time, self.speed, self.altitude)
         found[(self.speed < _SLOWEST) | self.gap] = np.nan
         return found

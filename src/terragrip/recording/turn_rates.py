@@ -145,7 +145,7 @@ def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> 
 
 
 def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
-    """Rate of turn (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` asks for rim speeds."""
+    """Yaw rate (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` selects rim speeds."""
     parts = []
     radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True)) if rims else {}
     for axle in vehicle.axles.values():

@@ -24,7 +24,7 @@ Order = tuple[int, ...]
 Axles = list[tuple[int, int]]
 
 SURE = 0.5
-"""Correlation of two rates of turn that tell the same, or of the opposite sign contradict each other."""
+"""Correlation from which two yaw rates agree, or with the opposite sign contradict each other."""
 
 WINDOW = 2.0  # s
 _MOST = 1e9  # of any unit: a larger value is an error, and its square may not be a number
@@ -177,7 +177,7 @@ def _turned(
 
 
 def _both_ways(rims: Floats, axles: Axles) -> bool:
-    """Whether the turns by the rims (k, n) of each axle go both ways: what one axle slips beyond another looks like turns one way."""
+    """Whether the turns by the rims (k, n) of each axle are to both sides: slip of one axle beyond another looks like turns to one side."""
     sides = (rims[right] - rims[left] for left, right in axles)
     return all(
         min(turn[turn > 0].sum(), -turn[turn < 0].sum()) > _OTHER * np.abs(turn).sum() for turn in sides

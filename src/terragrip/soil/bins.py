@@ -52,7 +52,7 @@ class BinSettings:
         return self.metres if self.by == BY_PULL else float(self.minimum)
 
     @property
-    def least_said(self) -> str:
+    def least_text(self) -> str:
         """`least` in words."""
         return f"{self.metres:g} m of way" if self.by == BY_PULL else f"{self.minimum} samples"
 

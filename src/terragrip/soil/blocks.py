@@ -26,7 +26,7 @@ PERIOD = 0.5
 SETTLING = 4
 """Blocks after a standstill, a stuck spell or a gap in which the estimates still swing in."""
 LEAST_ROWS = 4
-"""Fewest usable rows that tell how much a block varies."""
+"""Fewest usable rows that show how much a block varies."""
 LARGEST_SLIP = 0.6
 """Slip beyond which the ground cannot be read: the vehicle digs (and the paper's bins end)."""
 FLOOR = 1e-4

@@ -57,7 +57,7 @@ def compare_forms(
 ) -> FormVerdict:
     """Leave whole clusters (runs) out in turn, fit each form on the rest, judge it on the bin means of those left out.
 
-    With fewer than 2 clusters the folds are alternate bins instead, and the sentence says so. A form takes part where the used bins
+    With fewer than 2 clusters the folds are alternate bins instead, and the sentence reports it. A form is a candidate where the used bins
     exceed its parameters by two or more: a fold that loses a bin must still leave one more than the form can fit exactly. The sentence
     names the forms left out. Raises InputError on an unknown form, with fewer than LEAST_BINS used bins, or too few for the requested form.
     """

@@ -90,7 +90,7 @@ class AdhesionCurve:
         if np.count_nonzero(used) < need:
             raise InputError(
                 f"{np.count_nonzero(used)} slip bins between {bins.settings.lower:.0%} and {bins.settings.upper:.0%} hold "
-                f"{bins.settings.least_said} or more, too few to fit {', '.join(free)}",
+                f"{bins.settings.least_text} or more, too few to fit {', '.join(free)}",
                 hint="drive at more slips, or widen the bins",
             )
         slip, mean = bins.slip[used], bins.mean[used]

@@ -30,7 +30,7 @@ STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
 APART = 0.03
-"""Relative difference of the scale by pull from that by slip beyond which it is said."""
+"""Relative difference of the scale by pull from that by slip beyond which it is reported."""
 FALL = 0.05
 """Share of its top by which a curve must come down within the bins to make sorting by pull unfit."""
 DEFAULT = BinSettings(by=BY_PULL)
@@ -325,7 +325,7 @@ def _enough(bins: Bins) -> Bins:
     filled = int(np.count_nonzero(bins.used))
     if filled < LEAST_BINS:
         raise InputError(
-            f"the pulls fill {filled} bin{'s' * (filled != 1)} with {bins.settings.least_said}, of {LEAST_BINS} needed"
+            f"the pulls fill {filled} bin{'s' * (filled != 1)} with {bins.settings.least_text}, of {LEAST_BINS} needed"
         )
     return bins
 

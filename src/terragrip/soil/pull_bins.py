@@ -2,7 +2,7 @@
 
 Slip depends on the ground: under one pull a weak spot slips more than a strong one. Sorted by their own slip, bins of high slip gather
 weak spots, and bins at 5 % miss the strongest ground (decision 0075); noise of slip sorts too. The pull does not depend on the spot.
-So a pair goes into the bin of the slip at which the soil's mean curve gives the vehicle's pull, its driven wheels' mean adhesion.
+So a pair belongs to the bin of the slip at which the soil's mean curve gives the vehicle's pull, its driven wheels' mean adhesion.
 The bin's adhesion is the mean over its metres. Its slip is the mean too, on the scale of the prototype curve g (physics.md 5): a spot of
 scale a_i has mu_i = a_i g(s_i). So mean(mu) = a mean(g(s)), whereas the plain mean of s is biased where the curve bends. Random errors
 of slip cancel in that mean except for g's bend, which is known: the mean of e^(-k s) under normal errors is e^(k^2 sigma^2 / 2) too large.

@@ -108,7 +108,7 @@ def _quantities(
     rests_on: tuple[Evidence, ...],
     disagreement: float,
 ) -> list[Quantity]:
-    from scipy.special import stdtrit  # scipy.stats would take seconds to load
+    from scipy.special import stdtrit  # scipy.stats takes seconds to load
 
     factor = float(stdtrit(fit.blocks - 1, 0.975))
     sentence = (
@@ -140,7 +140,7 @@ def _quantities(
 
 
 def _disagreement(rows: Sharing) -> float:
-    """How much more the gains of single soils differ than their errors tell (Birge's ratio, at least 1).
+    """How much more the gains of single soils differ than their errors explain (Birge's ratio, at least 1).
 
     A gain is the same on every soil; a rut that helps the rear wheels, or wrong loads, are not.
     """
@@ -177,8 +177,10 @@ def _driving(table: Windows, vehicle: Vehicle) -> Windows:
     slips = slip(table.wheel_speed, table.hub_speed, vehicle.wheel_radius)
     on_curve = np.all((slips > _SLIP[0]) & (slips < _SLIP[1]), axis=1)
     # Where a turn is not known, the hubs' speeds are not; where it is tight, the wheels scrub and are far apart on their curve.
-    seen = ~turns_unseen(table, vehicle) & (np.ptp(table.hub_speed, axis=1) < _TIGHT * table.ground_speed)
-    return table.select(known & moving & whole & on_curve & seen & ~_near_border(table))
+    turn_known = ~turns_unseen(table, vehicle) & (
+        np.ptp(table.hub_speed, axis=1) < _TIGHT * table.ground_speed
+    )
+    return table.select(known & moving & whole & on_curve & turn_known & ~_near_border(table))
 
 
 def _rows(

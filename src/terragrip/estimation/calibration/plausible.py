@@ -49,7 +49,7 @@ def completed_by_positions(log: Recording) -> tuple[Recording, list[str]]:
 
 
 def plausible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
-    """The quantities of one kind, or none where one of them is beyond what a machine can have; ``unknown`` then says which."""
+    """The quantities of one kind, or none where one of them is implausible for any machine; ``unknown`` then names it."""
     for quantity in quantities:
         why = _beyond(quantity, vehicle)
         if why:
@@ -91,7 +91,7 @@ def gains_by_axle(gains: Sequence[Quantity], vehicle: Vehicle) -> list[str]:
 
 
 def turned_unseen(logs: Sequence[Recording], vehicle: Vehicle, known: Collection[str]) -> list[Unknown]:
-    """A line that says to give a yaw rate, where the machine turned, nothing tells how fast, and radii or gains are lacking."""
+    """A line that asks for a yaw rate, where the machine turned at an unknown rate, and radii or gains are missing."""
     if any(name.startswith(("wheel_radius", "drive_torque_gain")) for name in known):
         return []
     table = windows(logs, vehicle, 2.0)

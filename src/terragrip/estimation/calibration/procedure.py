@@ -244,7 +244,7 @@ def _common_radius(rolling: Rolling | Unknown, vehicle: Vehicle) -> float:
 
 
 def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
-    """The quantities of one kind, or none if the vehicle file knows them better already."""
+    """The quantities of one kind, or none if the vehicle file already states them more precisely."""
     if not quantities:
         return []
     key, stated = quantities[0].key, vehicle.uncertainty
@@ -272,7 +272,7 @@ def _radii(
 ) -> list[Quantity]:
     """The radii of all wheels: the common part from the passes, the differences of the wheels from ``gains``.
 
-    Where gains and radii could not be told apart (not ``determined``), the differences that were found are no more than a measure
+    Where gains and radii could not be separated (not ``determined``), the differences that were found are no more than a measure
     of how far the wheels may differ.
     """
     wheels = len(vehicle.wheels)

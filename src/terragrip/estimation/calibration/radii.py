@@ -42,7 +42,7 @@ _SLOWEST = 0.2  # m/s
 _STRAIGHT = 0.02  # relative difference of the wheels' speeds from side to side
 _GENTLE = 0.3  # likewise of the hubs, where the yaw rate is known
 _LEAST_DISTANCE = 5.0  # m of zero-pull passes
-_LOW = 0.7  # of the largest pull: windows above say nothing of the radius
+_LOW = 0.7  # of the largest pull: windows above it do not determine the radius
 _STEEPNESS = (
     float(np.log(5.0)),
     0.8,
@@ -176,8 +176,8 @@ def _fit(
 ) -> tuple[Floats, Floats, Floats, float]:
     """Least squares for the radii over the file's, ln C_j, ln A_j and the ground speed's delay; the variance is over blocks of track.
 
-    Without a label a stretch's slips err together: soft soil asks for more thrust and slips more, so that slip over adhesion between soils
-    is no soil's curve.
+    Without a label the slips of a stretch have a common error: soft soil needs more thrust and slips more, so slip over adhesion
+    between soils is not the curve of one soil.
     Returns the scale (w,), the variance (w,) of its logarithm, C (soils,), and how many blocks the radii rest on.
     """
     w, soils = len(vehicle.wheels), len(most)
@@ -257,7 +257,7 @@ def _stretches(windows: Windows) -> Ints:
 
 
 def _typical(size: Floats, used: Bools, stretch: Ints) -> Floats:
-    """The median adhesion of the used windows of each stretch; 0 for the labelled, whose slips do not err together."""
+    """The median adhesion of the used windows of each stretch; 0 for labelled ones, whose slips have no common error."""
     result = np.zeros(int(stretch.max(initial=0)) + 1)
     for label in np.unique(stretch[used & (stretch > 0)]):
         result[label] = max(_LEAST_ADHESION, float(np.median(size[used & (stretch == label)])))
@@ -278,7 +278,7 @@ def _less_offsets(rows: Floats, effect: Floats, stretch: Ints, std: Floats) -> t
 
 
 def _considered(vehicle: Vehicle, steepness: float) -> Floats:
-    """Variance (w,) of the relative radius from what passes cannot tell: torque zeros and gains, ρ_t."""
+    """Variance (w,) of the relative radius from what passes cannot determine: torque zeros and gains, ρ_t."""
     lever = np.sum(vehicle.axle_mass) * GRAVITY * float(np.mean(vehicle.wheel_radius))
     driven = max(1, int(vehicle.driven.sum()))
     stated = vehicle.uncertainty

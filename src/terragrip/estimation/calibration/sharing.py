@@ -1,13 +1,13 @@
 """Wheels that share one adhesion curve: torque gains of the wheels relative to each other.
 
-Wheels at the same slip on the same soil have the same adhesion, so what one wheel's torque says beyond the others is
+Wheels at the same slip on the same soil have the same adhesion, so the difference of one wheel's torque from the others' is
 its gain. Model of the mean torque of wheel i over window n (physics.md 1, averaged)::
 
     M_in = k_i (B_in + r_i F_in (m_n + d_n (s_in - s_n + (1 - s_in) e_i))) + o_i,   B = J dω/dt + r ρ_t F + r ρ_w ω
 
 m_n is the adhesion that all wheels have at the window's mean slip s_n, an unknown of its own in every window: so neither the noise of
 ground speed, nor the curve's form, nor what the soil does to all wheels alike enters the gains. The curve is needed only
-for its steepness d_n, which carries the wheels' small differences of slip
+for its steepness d_n, which holds the wheels' small differences of slip
 (:mod:`~terragrip.estimation.calibration.steepness`). Unknown are ln k_i (mean 0: a gain common to all
 wheels cannot be distinguished from m_n) and, with their priors, the relative radii e_i (mean 0, likewise), the offsets o_i and what is
 left of the gyroscope's zero, which shifts slip from side to side. A larger radius is a longer lever, too: what is solved for in place
@@ -138,7 +138,7 @@ def _fitted(data: Sharing, *, stretch: float = 1.0, form: int | None = None) -> 
 
 @dataclass(frozen=True)
 class _Fit:
-    jacobian: Floats  # (n, w, p), of the scaled residual, what m_n takes up taken out
+    jacobian: Floats  # (n, w, p), of the scaled residual, the part that m_n absorbs removed
     residual: Floats  # (n, w), likewise
     weight: Floats  # (n, w), of Huber
     normal: Floats  # (p, p), priors and the zero mean of ln k included
@@ -201,7 +201,7 @@ class _Problem:
         gain, offset = np.exp(values[:w]), values[2 * w : 3 * w]
         lever = gain * self.data.leverage
         rest = self.data.torque - offset - gain * self.data.known - lever * self._slip_part(values)
-        # Adhesion differs in proportion: the spread of a torque goes with the wheel's own share of it.
+        # Adhesion differs in proportion: the spread of a torque is proportional to the wheel's own share of it.
         size = np.abs(np.median(rest / lever, axis=1, keepdims=True)) * lever
         spread = np.hypot(self.local[:, None] * size, self.torque_noise)
         level = np.sum(rest * lever / spread**2, axis=1) / np.sum(lever**2 / spread**2, axis=1)
@@ -247,7 +247,7 @@ class _Problem:
         variance = float(np.sum(weight * scaled**2) / np.sum(weight)) * w / (w - 1)
         flat = jacobian.reshape(-1, len(values))
         normal = flat.T @ (flat * weight.reshape(-1, 1)) + variance * scale * self.prior
-        # The means of ln k and of e are 0, since m_n takes up what is common: rows of certainty.
+        # The means of ln k and of e are 0, since m_n absorbs what is common: rows without uncertainty.
         for part in (slice(w), slice(w, 2 * w)):
             normal[part, part] += 1e6 * float(np.max(np.diag(normal)[part]))
         return _Fit(jacobian, scaled, weight, normal, variance)
@@ -317,7 +317,7 @@ def block_covariance(
 def _lasting(shifts: Floats) -> Floats:
     """Factors (p,) of at least 1 on the standard errors: what neighbours of a row of shifts (blocks, p) add, by Bartlett's weights.
 
-    Newey and West, Econometrica 55, 1987. Products of chance sign may make a variance smaller; that is not believed.
+    Newey and West, Econometrica 55, 1987. Products of chance sign may make a variance smaller; that is not accepted.
     """
     reach = int(np.ceil(_LASTS * len(shifts)))
     alone = np.sum(shifts**2, axis=0)
@@ -329,7 +329,7 @@ def _lasting(shifts: Floats) -> Floats:
 
 
 def effective_blocks(normal: Floats, jacobian: Floats, block: Ints, unknown: int) -> float:
-    """How many equal blocks would tell one unknown as well as these do: (Σγ)²/Σγ², γ a block's part of its variance.
+    """How many equal blocks would determine one unknown as well as these do: (Σγ)²/Σγ², γ a block's part of its variance.
 
     Arguments as in `block_covariance`; Carter, Schnepel and Steigerwald, Review of Economics and Statistics 99, 2017.
     """

@@ -49,7 +49,7 @@ def calibrate_radii(
 
 
 def _scaled(stated: Quantity, zero: Zero | None) -> Quantity | Unknown:
-    """What the vehicle file states (a radius, or a gain, which goes the other way) at the zero of slip."""
+    """What the vehicle file states (a radius, or a gain, its inverse) at the zero of slip."""
     if zero is None:
         return Unknown(stated.name, "too few windows of steady motion; 40 s without load are needed")
     if zero.std >= UNTOLD and zero.ratio == 1:

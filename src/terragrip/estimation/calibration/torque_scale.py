@@ -1,4 +1,4 @@
-"""The scale of the torque columns, common to all wheels, from the forces that mass and drawbar tell.
+"""The scale of the torque columns, common to all wheels, from the forces that mass and drawbar determine.
 
 For a log whose torque columns are only proportional to torque (from a motor current, say), and as a check on any
 other. By physics.md 1, summed over the wheels and averaged over a window::
@@ -8,9 +8,9 @@ other. By physics.md 1, summed over the wheels and averaged over a window::
 
 K is raw torque over true torque. ρ_s, constant for a log, soil and direction of travel, is an intercept; a skid-steered
 vehicle's resistance in turns is a term of its own. Resistance that grows with slip would pass for a larger K: windows of high
-slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would take up thrust
-itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as a driver takes it
-with another speed or pull. Resistance that goes with the grade (wet below, dry above) would pass for a larger K, too, the more the grade
+slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would absorb thrust
+itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as it correlates
+with another speed or pull. Resistance that varies with the grade (wet below, dry above) would appear as a larger K, too, the more the grade
 makes of Y: it is in the interval.
 
 Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
@@ -44,9 +44,7 @@ _SLIP_RESISTANCE = 0.1  # prior SD of dρ_s/ds: hard ground 0, Brixius 0.06 to 0
 _MOST_SLIP = 0.2  # beyond, resistance grows faster; much less leaves out the starts of a log that has few
 _SLOPE = float(np.radians(0.5))  # prior of a slope that nothing measures, where the vehicle states none,
 _WITH_PUSH = 0.3  # and of its correlation with pull and acceleration
-_GROUND_WITH_GRADE = (
-    0.006  # prior SD of what of ρ_s goes with the grade: .02 from place to place, correlated by .3 as above
-)
+_GROUND_WITH_GRADE = 0.006  # prior SD of the part of ρ_s that varies with the grade: .02 from place to place, correlated by .3 as above
 _DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
 _STRONG = 3.0  # the instruments' covariance over its error
@@ -71,11 +69,11 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     """Scale K of the torque columns (raw over true torque), the same for all wheels, with its interval.
 
     Held (stale) values count only while fresh, and a window spans at least two updates of the slowest torque channel.
-    K goes with the vehicle's mass. To use it, set ``calibration.drive_torque_gain`` of every wheel to K.
+    K is proportional to the vehicle's mass. To use it, set ``calibration.drive_torque_gain`` of every wheel to K.
 
     Raises
     ------
-    InputError: fewer than 20 windows of driving, or too little pull, acceleration and slope to tell K at all (its 95 % interval holds 0).
+    InputError: fewer than 20 windows of driving, or too little pull, acceleration and slope to determine K (its 95 % interval holds 0).
     """
     logs = [without_held(r) for r in ([recordings] if isinstance(recordings, Recording) else recordings)]
     table = windows(logs, vehicle, _window_length(logs))
@@ -119,7 +117,7 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
 
 
 def _with_grade(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
-    """Relative SD of K by a resistance that goes with the grade."""
+    """Relative SD of K by a resistance that varies with the grade."""
     climb = _centered(rows.climb[:, None], rows.nuisance, weight)[:, 0]
     size = float(np.sqrt(np.mean(weight * climb**2)))
     if not size:
@@ -187,12 +185,12 @@ def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:
 
 
 def _slope(rows: _Balance, weight: Floats) -> tuple[float, float, Floats]:
-    """K, the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance taken out."""
+    """K, the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance terms removed."""
     table = np.column_stack([rows.thrust, rows.losses, rows.force, rows.other])
     x, losses, y1, y2 = _centered(table, rows.nuisance, weight).T
     strength = float(np.mean(weight * y1 * y2))
     instrument = (y1 + y2) / 2
-    # X = K (Y + losses): the losses are known, so they stand beside Y in the denominator.
+    # X = K (Y + losses): the losses are known, so they are added to Y in the denominator.
     below = strength + float(np.mean(weight * losses * instrument))
     scale = float(np.mean(weight * x * instrument)) / below if below else np.nan
     return scale, strength, x - scale * (instrument + losses)
@@ -214,13 +212,13 @@ def _jackknife(rows: _Balance, weight: Floats) -> float:
 
 
 def _partial_slope(values: Floats, rows: _Balance, weight: Floats) -> float:
-    """Slope of values (n,) over Y, nuisance taken out."""
+    """Slope of values (n,) over Y, nuisance terms removed."""
     value, y1, y2 = _centered(np.column_stack([values, rows.force, rows.other]), rows.nuisance, weight).T
     return float(np.sum(weight * value * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
 
 
 def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats, residual: Floats) -> float:
-    """Relative SD of K by a slope that neither pitch nor accelerometer tells: of what the vehicle states, or of what the balance leaves,
+    """Relative SD of K by a slope that neither pitch nor accelerometer measures: of what the vehicle states, or of what the balance leaves,
     since on hills that is mostly slope.
     """
     stated = vehicle.uncertainty.slope

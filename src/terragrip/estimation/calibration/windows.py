@@ -20,7 +20,7 @@ from terragrip.vehicle import Vehicle
 
 _BLOCK_COUNT = 40  # stretches of track wanted,
 _SHORTEST_BLOCK, _LONGEST_BLOCK = 4.0, 20.0  # m, and their lengths
-_LEAST_LOAD = 0.02  # share of the static load under which no wheel is taken to go
+_LEAST_LOAD = 0.02  # share of the static load below which no wheel load is assumed to fall
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Windows:
 def windows(recordings: Sequence[Recording], vehicle: Vehicle, length: float) -> Windows:
     """Cut recordings into windows of ``length`` [s].
 
-    Channels are taken as they are: remove held samples and zeros first. Without ``drawbar_force`` it is 0.
+    Channels are used as they are: remove held samples and zeros first. Without ``drawbar_force`` it is 0.
     """
     parts = [_windows_of(index, r, vehicle, length) for index, r in enumerate(recordings)]
     joined = {
@@ -218,7 +218,7 @@ def _labels(recording: Recording, bin_of: Ints, n: int) -> npt.NDArray[np.object
     labels = recording.labels.get("soil")
     if labels is None:
         return result
-    # Few rows change the label: look at the runs between them, not at every row.
+    # Few rows change the label: compare the runs between them, not every row.
     edge = np.flatnonzero(labels[1:] != labels[:-1]) + 1
     first = np.searchsorted(bin_of, np.arange(n))
     here = np.minimum(first, len(labels) - 1)

@@ -19,7 +19,7 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle import Vehicle
 
 WINDOW = 0.5
-"""Window length [s] in which standstill is looked for."""
+"""Window length [s] in which standstill is searched for."""
 
 _STANDING = 0.03  # m/s, of vehicle and rims, as window means
 _LEAST_STANDING = 2.0  # s a spell must last
@@ -108,7 +108,7 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
     within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
     means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
     between = float(np.std(means, ddof=1)) / np.sqrt(len(means)) if len(means) > 1 else 0.0
-    # Two spells hardly show their scatter: what is seen of it adds to what is within them.
+    # Two spells hardly show their scatter: what they do show adds to the scatter within them.
     error = max(within, between) if len(means) > 2 else float(np.hypot(within, between))
     return float(np.mean(means)), error
 
@@ -264,7 +264,7 @@ def inclination_zeros(
 ) -> tuple[list[Quantity], list[Unknown]]:
     """Zeros of accelerometer and pitch sensor from standstill, as far as they can be determined.
 
-    Standing on slope θ the accelerometer reads b + g sinθ, the pitch sensor p + θ: the data tell b - g p, or b + g sinθ
+    Standing on slope θ the accelerometer reads b + g sinθ, the pitch sensor p + θ: the data determine b - g p, or b + g sinθ
     where there is no pitch sensor, and no more. The sum is split by the priors' variances (the best linear estimate),
     and what stays open is in both intervals. ``noise`` is that of an accelerometer sample, m/s².
     """

@@ -1,6 +1,6 @@
 """Estimates in the files of others: what each suffix can hold, and who writes it.
 
-A writer takes consecutive parts of one table, the first when it is made, and is closed or, after a failure, dropped.
+A writer receives consecutive parts of one table, the first when it is made, and is closed or, after a failure, dropped.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class TableWriter(Protocol):
 
 @dataclass(frozen=True)
 class FileKind:
-    """What a suffix stands for: its ``title``, the class that writes it (module of this package, name), the ``package`` it needs and the
-    extra that brings it, the columns that it ``needs``, and how many rows it takes at ``most`` of a table with those columns."""
+    """What a suffix means: its ``title``, the class that writes it (module of this package, name), the ``package`` it needs and the
+    extra that brings it, the columns that it ``needs``, and the largest number of rows, ``most``, of a table with those columns."""
 
     title: str
     writer: tuple[str, str]
@@ -63,7 +63,7 @@ KINDS: dict[str, FileKind] = {
 
 
 def require_suffix(path: str | os.PathLike[str]) -> FileKind:
-    """What a file's name stands for; raises InputError where its suffix is none of `KINDS`, or what it needs is not installed."""
+    """What a file's name means; raises InputError where its suffix is none of `KINDS`, or what it needs is not installed."""
     suffix = Path(path).suffix.lower()
     if suffix not in KINDS:
         problem = f"estimates cannot be written as {suffix!r}" if suffix else "the name has no suffix"

@@ -1,4 +1,4 @@
-"""What a table of estimates says of itself, as texts for files that know no structure."""
+"""The metadata of a table of estimates, as texts for files without structured metadata."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class _ArrowFile:
 
 
 class ParquetFile(_ArrowFile):
-    """Parquet; the metadata of the file and of its columns hold all that the table says of itself."""
+    """Parquet; the metadata of the file and of its columns hold all metadata of the table."""
 
     def _opened(self, path: Path, schema: pa.Schema) -> Any:
         import pyarrow.parquet as pq

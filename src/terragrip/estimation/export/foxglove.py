@@ -61,9 +61,9 @@ def estimate_schema(names: tuple[str, ...]) -> dict[str, Any]:
     properties: dict[str, Any] = {}
     for name in names:
         column = column_named(name)
-        said = f"{column.description} [{column.unit}]" if column.unit else column.description
+        label = f"{column.description} [{column.unit}]" if column.unit else column.description
         kind = "string" if not column.unit and column.description else ["number", "null"]
-        properties[name] = {"type": kind, "description": said}
+        properties[name] = {"type": kind, "description": label}
     return {"title": "terragrip.TractionEstimate", "type": "object", "properties": properties}
 
 
@@ -71,7 +71,7 @@ class McapFile:
     """Topics ``/terragrip/estimate`` (terragrip.TractionEstimate, a message a row), ``/terragrip/position`` (foxglove.LocationFix) where
     there are positions, ``/terragrip/event`` (foxglove.Log) where an event begins or ends; metadata ``terragrip``: what it was made from.
 
-    Messages are stamped with the clock where the log says it, else with the log's own time from 0.
+    Messages are stamped with clock time where the log has it, else with the log's own time from 0.
     """
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
@@ -98,12 +98,12 @@ class McapFile:
         """Write the messages of a part."""
         stamps = self._stamps(part)
         for when, text in zip(stamps.tolist(), json_rows(part, self._names), strict=True):
-            self._say(self._estimate, when, text)
+            self._send(self._estimate, when, text)
         if self._position is not None:
             self._write_positions(self._position, part)
         self._write_events(part, stamps)
 
-    def _say(self, channel: int, when: int, text: str) -> None:
+    def _send(self, channel: int, when: int, text: str) -> None:
         self._writer.add_message(channel, log_time=when, data=text.encode(), publish_time=when)
 
     def _stamps(self, part: Estimates) -> Any:
@@ -128,7 +128,7 @@ class McapFile:
         for when, latitude, longitude, height in rows:
             high = f'"altitude":{height!r},' if height == height else ""  # what is not known is left out
             place = f'"frame_id":"vehicle","latitude":{latitude!r},"longitude":{longitude!r},{high}'
-            self._say(channel, when, f'{{"timestamp":{_time(when)},{place}{_NO_COVARIANCE}')
+            self._send(channel, when, f'{{"timestamp":{_time(when)},{place}{_NO_COVARIANCE}')
 
     def _write_events(self, part: Estimates, stamps: Any) -> None:
         events = part["event"]
@@ -141,7 +141,7 @@ class McapFile:
                 "message": ", ".join(word for word in words if word),
                 "name": "terragrip", "file": "", "line": 0,
             }  # fmt: skip
-            self._say(self._event, when, f'{{"timestamp":{_time(when)},{json.dumps(data)[1:]}')
+            self._send(self._event, when, f'{{"timestamp":{_time(when)},{json.dumps(data)[1:]}')
             self._last_event = begun
 
     def close(self) -> None:

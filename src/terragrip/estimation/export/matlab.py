@@ -52,7 +52,7 @@ class MatFile:
         from scipy.io import savemat
 
         columns: dict[str, Any] = {}
-        for name in self._first.names:  # joined one by one, so that no column stands twice for long
+        for name in self._first.names:  # joined one by one, so that no column is in memory twice for long
             columns[name] = np.concatenate(self._parts.pop(name))[:, None]
         meanings = {name: column_named(name) for name in self._first.names}
         content = {

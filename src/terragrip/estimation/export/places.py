@@ -29,7 +29,7 @@ def placed(part: Estimates) -> Estimates:
 
 
 class GeoJson:
-    """A FeatureCollection; ``about`` is a member of it, positions stand in the geometry alone."""
+    """A FeatureCollection; ``about`` is a member of it, positions are in the geometry only."""
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
         self._target = target
@@ -106,7 +106,7 @@ class GeoPackage:
             raise _nowhere(self._target)
 
     def drop(self) -> None:
-        """Each block stands in the file already."""
+        """Each block is already in the file."""
 
 
 def _layer(part: Estimates) -> Any:
@@ -119,8 +119,8 @@ def _layer(part: Estimates) -> Any:
     arrays, fields = list(table.columns), []
     for field in table.schema:
         column = column_named(field.name)
-        said = f"{column.description} [{column.unit}]" if column.unit else column.description
-        fields.append(field.with_metadata({"GDAL:OGR:comment": said}))
+        label = f"{column.description} [{column.unit}]" if column.unit else column.description
+        fields.append(field.with_metadata({"GDAL:OGR:comment": label}))
     if part.start is not None:
         ticks = clock_times(part.time, part.start).astype("datetime64[ms]").view(np.int64)
         clock = pa.Array.from_buffers(pa.int64(), len(ticks), [None, pa.py_buffer(ticks)])

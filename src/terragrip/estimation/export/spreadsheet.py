@@ -19,7 +19,7 @@ CLOCK = "clock (UTC)"
 
 
 class Spreadsheet:
-    """Sheets ``estimates`` (clock time in its second column where the log says it), ``columns`` and ``about``; missing: an empty cell."""
+    """Sheets ``estimates`` (clock time in its second column where the log has it), ``columns`` and ``about``; missing: an empty cell."""
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
         import xlsxwriter

@@ -1,4 +1,4 @@
-"""What a recording offers for telling grounds apart: each sensor family's channels, free of missing and held samples."""
+"""The channels of a recording that distinguish grounds, by sensor family, free of missing and held samples."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from terragrip.recording.columns import columns_of, numbers, seconds
 from terragrip.recording.held import held_period
 from terragrip.recording.schema import TIME
 
-# A motor current stands in for the torque: what is learnt does not depend on the gain between them.
+# A motor current replaces the torque: what is learnt does not depend on the gain between them.
 CURRENT = ("motor_current_",)
 TORQUE = ("drive_torque_",)
 PREFIXES = {
@@ -68,7 +68,7 @@ class Signals:
 
 def shortest_period(channels: Mapping[str, Channel]) -> float:
     """The period [s] of the fastest of some channels."""
-    # One sensor's channels share their clock, whose period is worked out once.
+    # One sensor's channels share their clock, whose period is computed once.
     clocks = {(len(c.time), c.time[0], c.time[-1]): c for c in channels.values()}
     return min(channel.period for channel in clocks.values())
 
@@ -137,7 +137,7 @@ def signals_of(table: Columns, held: Mapping[str, float]) -> Signals:
         if np.count_nonzero(keep) > 1:
             family = family_of(name) or ""
             families.setdefault(family, {})[name] = Channel(time[keep], values[keep])
-    # Each row stands for one period, so a window's worth of rows fills a window. Every row counts, whatever was
+    # Each row counts for one period, so a window's worth of rows fills a window. Every row counts, whatever was
     # measured in it: a recording has the same windows with and without a sensor.
     period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     return Signals(float(time[0]), float(time[-1]) + period, families)

@@ -226,7 +226,7 @@ class GroundClassifier:
         return self._learnt
 
     def check_parameters(self) -> None:
-        """Raises InputError at the first parameter out of its range; `fit` and `predict` ask for themselves."""
+        """Raises InputError at the first parameter out of its range; `fit` and `predict` call it themselves."""
         ranges = {
             "window": (0.0, np.inf, False),
             "step": (0.0, np.inf, False),

@@ -23,7 +23,7 @@ from terragrip.ground.classification.channels import (
 def not_comparable(
     tables: Sequence[Columns], codes: npt.NDArray[np.intp]
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Beginnings of columns to leave out, both in learning and in telling, and a note on each.
+    """Beginnings of columns to leave out, both in training and in prediction, and a note on each.
 
     ``codes`` (tables,): the ground of each. Torque and current are two quantities, of which one cannot be distinguished from what was
     learnt of the other: what fewer grounds, or recordings, hold is left out. So is an axis of a body sensor that some ground lacks.

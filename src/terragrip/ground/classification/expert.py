@@ -95,7 +95,7 @@ class Expert:
 def train(
     families: frozenset[str], names: tuple[str, ...], windows: Examples, threads: int, seed: int
 ) -> Expert:
-    """Fit an expert; what is said of probabilities and strangeness is learnt from windows of recordings that were held out."""
+    """Fit an expert; calibrations of probabilities and strangeness are learnt from windows of recordings that were held out."""
     codes, folds = windows.codes, windows.folds
     everything = np.ones(len(codes), dtype=bool)
     learnt_from = [everything, *(folds != fold for fold in range(int(folds.max()) + 1))]
@@ -110,7 +110,7 @@ def train(
         scores[:, folds == fold], odd[:, folds == fold] = of_scores, of_odd
     same = np.ones(len(codes))
     strangeness = Strangeness.fit(odd, _class_weights(same, codes), windows.groups, windows.starts)
-    # Windows of one recording err together: a long one tells more than a short one, but not in proportion.
+    # Windows of one recording have common errors: a long one gives more evidence than a short one, but not in proportion.
     _, of_recording, size = np.unique(windows.groups, return_inverse=True, return_counts=True)
     weight = _class_weights(same / np.sqrt(size[of_recording]), codes)
     slopes, offsets = calibrate(scores, codes, weight, len(size))
@@ -144,7 +144,7 @@ def calibrate(scores: Floats, codes: Codes, weight: Floats, recordings: int) -> 
         return value, gradient
 
     classes = scores.shape[2]
-    # The weak pull on slopes keeps those of parts that never err finite.
+    # The weak prior on slopes keeps those of parts without errors finite.
     pull = np.r_[np.full(parts, 1e-3), np.full(classes, 1e-4 + 0.5 / (_OFFSET**2 * recordings))]
     start = np.r_[np.ones(parts), np.zeros(classes)]
     bounds = [(-3, 5)] * parts + [(-8, 8)] * classes

@@ -1,4 +1,4 @@
-"""Features of windows: what each says about the ground, and which sensors it needs.
+"""Features of windows: what each shows of the ground, and which sensors it needs.
 
 A feature's name begins with its sensors. Wheels come in as mean and spread over the wheels, so that neither their
 number nor their order matters. Sizes come in as logarithms relative to the vehicle's usual ones, so that a gain on
@@ -103,7 +103,7 @@ def of_one_wheel(feature: str) -> bool:
 
 
 def of_sides(feature: str) -> bool:
-    """Whether a feature compares the fastest wheel with the slowest, which is telling only beside the motion."""
+    """Whether a feature compares the fastest wheel with the slowest, which is informative only together with the motion."""
     return feature.partition(": ")[2].startswith(SIDES)
 
 
@@ -251,7 +251,7 @@ def _octaves(energies: Floats) -> list[Floats]:
 def _yaw(
     usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, speeds: tuple[Floats, float]
 ) -> Table:
-    """How much the body turns for what the wheels ask: low on ground that lets a skid-steered vehicle slide."""
+    """How much the body turns relative to what the wheels command: low on ground that lets a skid-steered vehicle slide."""
     channels = usable[TURN]
     if "angular_velocity_z" not in channels:
         return {}

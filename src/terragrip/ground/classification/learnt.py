@@ -69,7 +69,7 @@ class Learnt:
         novelty = np.full(len(features), np.nan)
         open_rows = np.ones(len(features), dtype=bool)
         nowhere = np.zeros(len(features), dtype=bool)
-        # Whole sensors first: an axis that is missing makes all that the others of a body sensor tell look strange.
+        # Whole sensors first: a missing axis makes all features of a body sensor look strange.
         for least in (_WHOLE, PRESENT):
             measured = measured_families(self.features, features, least)
             for expert in self.experts:

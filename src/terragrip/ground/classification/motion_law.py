@@ -12,7 +12,7 @@ from terragrip.ground.classification.standardization import centre_of, scale_abo
 
 _RIDGE = 30.0  # windows: a law stays near that of all grounds where it has few
 _FLOOR = 0.05  # of a feature's variance
-_INDEPENDENT = 4.0  # features: together they tell as much as so many that do not repeat each other
+_INDEPENDENT = 4.0  # features: together they give as much evidence as so many independent ones
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class MotionLaw:
             about = rest[mine] - terms[mine] @ own
             laws.append(common + own)
             covariance += about.T @ about / (len(about) * classes)
-        # The fewer windows there are to a feature, the less the covariance is believed.
+        # The fewer windows there are to a feature, the less weight the covariance has.
         covariance += (_FLOOR + len(covariance) / len(codes)) * np.eye(len(covariance))
         whitening = np.linalg.inv(np.linalg.cholesky(covariance)).T
         return cls(

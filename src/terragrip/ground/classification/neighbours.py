@@ -1,4 +1,4 @@
-"""Windows near one another in time share what they tell."""
+"""Evidence of windows near one another in time is shared."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Which features each part of an expert takes.
+"""Which features each part of an expert uses.
 
 How a vehicle is driven is the driver's choice, not the ground's: a run in which the driver turned more than in any other on that
-ground should not be taken for another ground. So of the motion the machine sees pace and turning alone; what all the other sensors
-show is also judged *given* the motion (`motion_law`). Whatever a single wheel tells is left to the forest.
+ground should not be classified as another ground. So of the motion the machine sees pace and turning alone; what all the other sensors
+show is also judged *given* the motion (`motion_law`). Features of single wheels are left to the forest.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
 
-_LIMIT = 3.5  # standard deviations: what lies further out says no more
+_LIMIT = 3.5  # standard deviations: what lies further out gives no more evidence
 _TRUST = 0.5  # power of the ratio of variances
 
 
@@ -54,7 +54,7 @@ def centre_of(features: Floats) -> Floats:
 
 
 def scale_about(centre: Floats, features: Floats) -> Floats:
-    """SD (features,) of the measured values about ``centre`` (features,); infinite for a constant, which says nothing."""
+    """SD (features,) of the measured values about ``centre`` (features,); infinite for a constant, which shows nothing."""
     measured = np.isfinite(features)
     scale = np.sqrt((np.where(measured, features - centre, 0.0) ** 2).sum(axis=0) / _count(measured))
     return np.where(scale > 1e-9 * (1.0 + np.abs(centre)), scale, np.inf)

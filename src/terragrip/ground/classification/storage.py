@@ -135,7 +135,7 @@ def _keys(part: str) -> dict[str, str]:
 
 
 def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
-    """What a header and its arrays say was learnt; raises KeyError, TypeError or ValueError on what does not fit."""
+    """The model that a header and its arrays describe; raises KeyError, TypeError or ValueError on what does not fit."""
     layout = header["layout"]
     numbers = [
         layout["window"],

@@ -74,7 +74,7 @@ def collect(
 ) -> TrainingSet:
     """Cut and describe windows: up to ``most`` of each class, the closer together the less there is of it.
 
-    Where there are more, every recording gives as many as it can: one long drive does not stand for its ground.
+    Where there are more, every recording gives as many as it can: one long drive does not represent its ground.
     """
     spans = np.array([max(s.end - s.start, layout.window) for s in signals])
     total = np.bincount(codes, weights=spans)

@@ -1,4 +1,4 @@
-"""What wheels tell of the ground: how evenly they turn, and how much effort they take."""
+"""Features of the wheels: how evenly they turn, and how much effort they need."""
 
 from __future__ import annotations
 
