@@ -159,6 +159,31 @@ def test_a_slope_that_nothing_measures_moves_load_by_its_weight(drive: Make, veh
     assert errors.drawbar == 7.0
 
 
+def test_a_pull_that_no_cell_measures_leaves_the_gains_of_the_axles_open(
+    drive: Make, vehicle: Vehicle
+) -> None:
+    """A pull P at height h moves P h/L from the front axle to the rear one: front and rear gains come out up to that wrong."""
+    log = drive(gain=GAIN, standing=10)
+    unseen = replace(log, channels={n: c for n, c in log.channels.items() if n != "drawbar_force"})
+    assert (
+        np.abs(relative_gains(unseen, vehicle)[0] - RELATIVE).max() < 5e-4
+    )  # at height 0 a pull moves nothing
+    high = Vehicle.from_dict({**vehicle.to_dict(), "hitch_height": 0.1})
+    open_gains = calibrate(unseen, high)
+    assert not any(quantity.key == "drive_torque_gain" for quantity in open_gains.quantities)
+    (why,) = (u.why for u in open_gains.unknown if u.name == "drive_torque_gain, axle to axle")
+    driving = log.time > 10
+    thrust = np.mean(sum(log[f"drive_torque_{wheel}"][driving] for wheel in WHEELS)) / 0.2
+    moved = thrust * 0.1 / 0.6 / GRAVITY  # kg
+    adhesion = (
+        1 - (0.02 * 140 * GRAVITY + 8 * log["wheel_speed_fl"][driving].mean()) / thrust
+    )  # the rest bends tires
+    expected = (
+        adhesion * (np.log(1 + moved / 80) - np.log(1 - moved / 60)) / 2
+    )  # the mean of the log gains stays
+    assert float(why.split("open by ")[1].split(" %")[0]) == pytest.approx(100 * expected, rel=0.1)
+
+
 def on_soils(*gains: np.ndarray, windows: int = 400) -> Sharing:
     """The exact problem on several soils, each with gains of its own, one behind the other."""
     parts = [rows(seed, gain).select(np.arange(400) < windows) for seed, gain in enumerate(gains)]

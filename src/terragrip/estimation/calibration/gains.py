@@ -30,6 +30,11 @@ _SEGMENT = 20.0  # m of track that count as one soil where there is no label
 _EDGE = 0.3  # m on either side of a soil's border
 _RADIUS = 0.003  # prior of the wheels' relative radii where the vehicle states none
 _LEAST_OFFSET = 1e-3  # N m
+_TOLD_PULL = 0.005  # relative: a smaller effect of a pull that no cell measures is not worth a sentence
+_NO_PULL = (
+    "no log has a drawbar_force, and what a tool pulls moves load between the axles, so that these gains are open by "
+    "{:.1f} %: measure it, or leave hitch_height out of the vehicle file where nothing is ever towed"
+)
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,17 @@ def relative_gains(
     disagreement = max(1.0, disagreement / fit.lasting) if disagreement > 1 else 0.0
     own = max(1.0, disagreement) ** 2 * fit.covariance
     covariance = own + _considered_loads(fit, table, vehicle, driven, errors)
+    unknown = [common]
+    if not any("drawbar_force" in log.channels for log in logs):
+        pull = _unseen_pull(table, vehicle, driven)
+        moved = _considered_loads(fit, table, vehicle, driven, ChannelErrors(0.0, 0.0, pull))
+        own, covariance = (
+            own + moved,
+            covariance + moved,
+        )  # a pull differs from log to log, so the gains must not hold it
+        most = float(np.sqrt(moved.diagonal()[: len(driven)].max()))
+        if most > _TOLD_PULL:
+            unknown.append(Unknown(f"{key}, axle to axle", _NO_PULL.format(100 * most)))
     rests_on = evidence(
         table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count
     )
@@ -96,7 +112,7 @@ def relative_gains(
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius
     radius_std[driven] = np.sqrt(np.diag(covariance)[len(driven) :])
-    return RelativeGains(quantities, [common], radius, radius_std)
+    return RelativeGains(quantities, unknown, radius, radius_std)
 
 
 def _quantities(
@@ -252,6 +268,14 @@ def _considered_loads(
         changes.append(after / before - 1)
     effects = [fit.load_sensitivity @ change[driven] for change in changes]
     return np.sum([np.outer(effect, effect) for effect in effects], axis=0)
+
+
+def _unseen_pull(table: Windows, vehicle: Vehicle, driven: Ints) -> float:
+    """What a tool pulls at most where no cell measures it [N]: all that the wheels' forces do beside accelerating."""
+    forces = np.sum((table.torque / vehicle.wheel_radius)[:, driven], axis=1) - vehicle.mass * np.nan_to_num(
+        table.push
+    )
+    return max(float(np.nanmean(forces)), 0.0)
 
 
 def _mean_loads(table: Windows, vehicle: Vehicle, channels: dict[str, Floats]) -> Floats:
