@@ -129,16 +129,16 @@ def test_positions_outrun_a_slow_speed_by_half_as_much_again_in_a_straight_line(
 
 
 def test_the_straight_way_is_told_against_the_one_driven() -> None:
-    time = np.arange(0.0, 101.0)
-    nothing = np.zeros(101)
+    time = np.arange(0.0, 121.0)
+    nothing = np.zeros(121)
     track = Track(time, 3.0 * time, 4.0 * time, nothing, nothing, nothing, nothing.astype(bool))
     log = Recording(time, {"ground_speed": np.where(time % 2, -2.0, np.nan)})
-    assert _straight_ahead(log, track) == pytest.approx(2.5)
+    assert _straight_ahead(log, track) == pytest.approx((2.5, 2.5))
     stop = Recording(time, {"ground_speed": np.where(time < 50, 2.0, 0.1)})  # creeping windows do not count
-    assert _straight_ahead(stop, track) == pytest.approx(2.5)
-    assert _straight_ahead(Recording(time, {"ground_speed": nothing}), track) == 0.0
+    assert _straight_ahead(stop, track) == pytest.approx((2.5, 2.5 / 1.117))  # five windows are few
+    assert _straight_ahead(Recording(time, {"ground_speed": nothing}), track) == (0.0, 0.0)
     short = Track(time[:10], *(nothing[:10] for _ in range(5)), nothing[:10].astype(bool))
-    assert _straight_ahead(log, short) == 0.0
+    assert _straight_ahead(log, short) == (0.0, 0.0)
 
 
 def test_turns_agree_by_their_correlation_about_zero_over_two_seconds() -> None:

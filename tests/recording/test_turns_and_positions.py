@@ -194,6 +194,22 @@ def test_poor_positions_of_a_slow_robot_are_no_wrong_unit() -> None:
     assert unit_warnings(log, None) == []
 
 
+@pytest.mark.parametrize("seed", [1000, 1001, 1002])
+@pytest.mark.parametrize(("scale", "said"), [(1.0, False), (0.98, False), (0.95, True), (0.9, True)])
+def test_a_ground_speed_five_per_cent_low_is_seen_by_the_positions(
+    scale: float, said: bool, seed: int
+) -> None:
+    """By those of a receiver without corrections, too: half a metre that wanders over half a minute. Slip would be .05 too large."""
+    columns, draws = field(seed), np.random.default_rng(seed + 1)
+    for name in ("latitude", "longitude"):
+        error = np.interp(columns["time"], np.arange(0, 420, 15.0), 0.5 * draws.standard_normal(28))
+        columns[name] = columns[name] + np.degrees(error / 6_378_137.0)
+    columns["ground_speed"] = scale * columns["ground_speed"]
+    notes = unit_warnings(Recording.from_frame(columns), machine())
+    assert any(f"move {1 / scale:.3g}"[:8] in note for note in notes) is said
+    assert said or notes == []
+
+
 @pytest.mark.parametrize("value", [0.0, -0.02])
 def test_a_gyroscope_that_never_changes_is_named_where_the_wheels_turn(value: float) -> None:
     """Turns on the spot had a slip of .99 each, surely: the hubs were taken to stand still."""

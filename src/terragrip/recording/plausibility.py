@@ -55,7 +55,12 @@ _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, 
 _ONE = 1.15  # quartiles of one ratio
 _GAP = 1.0  # s, or three samples: nothing was measured within it
 _OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
-_TOO_SLOW, _LONG_WAY = 1.15, 20.0  # the same, over windows of so many metres
+_TOO_SLOW, _LONG_WAY = 1.03, 20.0  # the same, over windows of so many metres,
+_FEW, _VAGUE = (
+    10,
+    1.117,
+)  # of which at least so many go straight: else it is surely no more than this share less
+_STRAIGHT = 1.01  # both halves of a window over all of it
 _TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
@@ -213,34 +218,48 @@ def _position_warnings(recording: Recording, track: Track | None, *, wheels_agre
             else ""
         )
         return [f"{sentence}: check its unit and scale.{clock}"]
-    if 2.9 < result < 4.4 and _straight_ahead(recording, track) > _OUTRUN:
+    if 2.9 < result < 4.4 and _straight_ahead(recording, track)[0] > _OUTRUN:
         return [f"{sentence}: it was converted from km/h, but may be in m/s."]
-    ahead = _straight_ahead(recording, track, _LONG_WAY)
-    if ahead > _TOO_SLOW:
+    ahead, surely = _straight_ahead(recording, track, _LONG_WAY)
+    if surely > _TOO_SLOW:
         return [
             f"In a straight line the positions move {ahead:.3g} times as far as ground_speed does: check its unit and scale "
-            "(a knot is 1.852 km/h, a mile per hour 1.609), and that latitude and longitude are not exchanged."
+            "(a knot is 1.852 km/h, a mile per hour 1.609; a radar's angle), and that latitude and longitude are not exchanged."
         ]
     return []
 
 
-def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> float:
-    """Distance of the positions in a straight line over the distance by ground speed in the same time: median over windows in motion.
+def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> tuple[float, float]:
+    """Distance of the positions over the distance by ground speed in the same time: median over windows in motion, of those that go
+    straight where these are many; and that less three standard errors, the scatter's.
 
-    ``least`` [m]: the shortest distance of a window by ground speed, larger than the positions' noise.
+    A turn only shortens a straight line between positions. ``least`` [m]: the shortest distance of a window by ground speed, larger than
+    the positions' noise.
     """
     speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
     length = max(_WAY_WINDOW, least / max(_high(speed), 1e-9))
-    edges = np.arange(track.time[0], track.time[-1], length)
-    if len(edges) < 2:
-        return 0.0
+    edges = np.arange(track.time[0], track.time[-1], length / 2)
+    edges = edges[: len(edges) - (len(edges) + 1) % 2]  # two halves to a window
+    if len(edges) < 3:
+        return 0.0, 0.0
     north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
-    chord, made = np.hypot(np.diff(north), np.diff(east)), np.diff(np.interp(edges, recording.time, way))
+    chord = np.hypot(np.diff(north[::2]), np.diff(east[::2]))
+    halves = np.hypot(np.diff(north), np.diff(east)).reshape(-1, 2).sum(axis=1)
+    edges, made = edges[::2], np.diff(np.interp(edges[::2], recording.time, way))
     moving = made > 0.3 * _high(made)
     for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
         moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
-    return median(chord[moving] / np.maximum(made[moving], 1e-9)) if moving.any() else 0.0
+    straight = moving & (halves < _STRAIGHT * chord)
+    if not moving.any():
+        return 0.0, 0.0
+    rows = straight if straight.sum() >= _FEW else moving
+    ratio = chord[rows] / np.maximum(made[rows], 1e-9)
+    middle = median(ratio)
+    spread = median(
+        np.abs(ratio - middle)
+    )  # 1.4826 of it is the SD, and 1.2533/√n of that the median's error
+    return middle, middle - 5.6 * spread / np.sqrt(len(ratio)) if rows is straight else middle / _VAGUE
 
 
 def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:
