@@ -38,7 +38,7 @@ DOCUMENT = Path(__file__).resolve().parents[1] / "docs/formats.md"
 RATES = (None, 100.0, 20.0, 10.0)
 LIMITS = {
     "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
-    "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _SHARED _COPY _DRIVEN",
+    "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
     "frozen": "_TIMES _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
@@ -128,6 +128,14 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         vehicle,
     )
     yield "time in minutes", "not be in seconds", replace(log, time=time / 60), vehicle
+    ground, known = log.channels["ground_speed"], np.isfinite(log.channels["ground_speed"])
+    fast = np.interp(time - 0.01 * (time - time[0]), time[known], ground[known])
+    yield (
+        "clocks 1 % apart",
+        "drift apart",
+        log.with_channels(ground_speed=np.where(known, fast, np.nan)),
+        vehicle,
+    )
     yield "odometry", "odometry", log.with_channels(ground_speed=np.mean(rims, axis=0)), vehicle
     yield "speed held 8 s", "repeats", changed(log, "ground_speed", by=held), vehicle
     yield "torque held 8 s", "repeats", changed(log, torques[0], by=held), vehicle

@@ -9,6 +9,7 @@ import numpy as np
 from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.held import measured_part
+from terragrip.recording.lag import lag_within
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import gaps
@@ -25,6 +26,13 @@ _ENOUGH = 4000  # rows that are examined
 _OUTRUN = 3.0  # the positions' spread over the way driven
 _SPREAD = 20.0  # m
 _CLOCK = "time may not be in seconds: give its unit in a profile, 'time: {from: ..., unit: min}'"
+
+_PART = 1200.0  # s of the log at most, in which the speeds' lag counts as one
+_DRIFT, _CERTAIN = (
+    0.2,
+    4.0,
+)  # s, and standard errors, by which the last part's lag differs from the first one's
+_EVENLY = 0.25  # of that difference: how far the middle part's lag is from the mean of both
 
 _SHARED, _COPY = 1e-3, 2e-4  # of the speed: noise of the ground speed, and how nearly the wheels have it too
 _DRIVEN = 0.1  # of the greatest speed: more is motion
@@ -53,6 +61,32 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {_CLOCK}."
         ]
     return []
+
+
+def drift_warnings(recording: Recording) -> list[str]:
+    """A sentence where the ground speed falls ever further behind its wheels, or they behind it: two loggers' clocks in one file."""
+    time, channels = recording.time, recording.channels
+    if "ground_speed" not in channels or not np.all(np.diff(time) > 0):
+        return []
+    third = (time[-1] - time[0]) / 3
+    lags = []
+    for k in range(3):
+        edges = time[0] + k * third + np.array([0.0, min(third, _PART)])
+        rows = slice(*np.searchsorted(time, edges))
+        lags.append(lag_within(time[rows], {name: values[rows] for name, values in channels.items()}))
+    first, middle, last = lags
+    if first is None or middle is None or last is None:
+        return []
+    grown, error = last.seconds - first.seconds, float(np.hypot(first.std, last.std))
+    explained = max(lag.explained[1] for lag in (first, middle, last))
+    uneven = abs(middle.seconds - (first.seconds + last.seconds) / 2)
+    if abs(grown) < max(_DRIFT, _CERTAIN * error + explained) or uneven > _EVENLY * abs(grown):
+        return []
+    return [
+        f"ground_speed is {first.seconds:.2f} s behind the wheel speeds in the first third of the log, {middle.seconds:.2f} s in the "
+        f"second and {last.seconds:.2f} s in the last: its clock and theirs drift apart by {abs(grown) / (2 * third):.2%}. Stamp both by "
+        f"one clock, or divide the time of the ground speed by {1 + grown / (2 * third):.5f} before joining them."
+    ]
 
 
 def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -15,7 +15,7 @@ from terragrip.recording.forces import Courses, acceleration_warnings, balance_w
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
-from terragrip.recording.pace import clock_warnings, odometry_warnings
+from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.reverse import reverse_warnings
 from terragrip.recording.rolling import RATIOS
@@ -96,6 +96,7 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *sided,
         *uneven,
         *_drive_warnings(recording),
+        *drift_warnings(recording),
         *_position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds)),
         *exchanged,
         *turn_rate_warnings(recording, None if exchanged else vehicle, track),
