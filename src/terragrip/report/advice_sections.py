@@ -149,7 +149,7 @@ def control() -> Section:
     prose = (
         "The set-point (docs/advice.md) against wheels at a fixed speed and at a fixed torque, in the loop with the estimator. "
         "Digging: into soft ground that "
-        "bears less than is asked, where it saves most of the energy by not digging. Work: several soils, hills, draught that "
+        "carries less than is asked, where it saves most of the energy by not digging. Work: several soils, hills, draught that "
         "comes and goes, where slip follows the pull and the set-point neither saves nor loses, but on the paper's fields, where it "
         "saves with heavy tools and covers less ground. Figures of benchmarks/bench_slip_control.py, not of this run.",
     )

@@ -227,7 +227,7 @@ def _sensor_prose(run: Run) -> tuple[str, ...]:
         notes.append(
             "While the vehicle is stuck its tool slides up and pushes: the force on the axle falls or turns "
             "negative, the torque and with it µ stay high. The paper cuts the longest such spell out by hand; here the "
-            "estimates' own events flag all of them, and R² stands with and without the flagged rows."
+            "estimates' own events flag all of them, and R² is given with and without the flagged rows."
         )
     return tuple(notes)
 
@@ -236,10 +236,10 @@ _METHOD_PROSE = (
     "The model is affine in its state, so ekf, ukf and kalman are one filter computed in different ways and agree to "
     "rounding; aukf and aukf-fs adapt the process noise (aukf-fs is the paper's method); bank mixes four noise levels; "
     "algebraic solves the equations of motion on low-passed signals.",
-    "µ stands apart from the sensor by ρs, whatever the method: a negative R² of µ against the sensor is the sensor's "
-    "place, not the estimate's error, which the table against the truth shows. \"The truth itself\" is the simulation's "
-    "own κ or µ against its sensor: how far the sensor's dynamics and noise let any estimate come. An estimate may come out a "
-    "little above: the sensor feels bumps under its one wheel, which the true κ leaves to the slope. NRMSE divides by "
+    "µ differs from the sensor by ρs, whatever the method: a negative R² of µ against the sensor comes from the sensor's "
+    "position, not from the estimate's error, which the table against the truth shows. \"The truth itself\" is the simulation's "
+    "own κ or µ against its sensor: the best that the sensor's dynamics and noise allow any estimate. An estimate may be a "
+    "little above: the sensor measures bumps under its one wheel, which the true κ counts as slope. NRMSE divides by "
     "the range of the reference, which a sensor's few highest spikes set: compare it between methods, not with the "
     "paper.",
 )

@@ -291,7 +291,7 @@ def _summary(run: Run) -> _Summary:
 def _runs(summaries: Sequence[_Summary]) -> Section:
     clocked = any(one.began is not None for one in summaries)
     table = Table(
-        "The runs of this report. Events: the share of rows that carry each.",
+        "The runs of this report. Events: the share of rows with each.",
         ("run", *(["began"] * clocked), "duration [s]", "distance [m]", "soils", "method", "events"),
         tuple(
             (

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from terragrip.ground.result import Ground, Timeline
 
 ALIKE = ("fine", "wet")
-"""Soils that the paper could not tell apart: their shares are also given as one."""
+"""Soils that the paper could not distinguish: their shares are also given as one."""
 SHOWN = 2
 """Drives drawn over time: those with most changes."""
 LEAST_EVENT = 0.5
@@ -222,7 +222,7 @@ def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
     if set(ALIKE) <= set(true):
         alike = np.isin(true, ALIKE) & np.isin(estimated, ALIKE)
         joined = percent(float(np.mean((true == estimated) | alike)))
-        sentence += f", in {joined} with {names(ALIKE)} taken as one, which the paper could not tell apart"
+        sentence += f", in {joined} with {names(ALIKE)} taken as one, which the paper could not distinguish"
     table = Table(
         "The soil by its label (rows) and the recognised soil (columns), in shares of the row.",
         ("label", *columns, "blocks of 0.5 s"),

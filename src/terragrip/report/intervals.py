@@ -63,7 +63,7 @@ def draw_coverage(coverages: Sequence[Coverage]) -> str:
     figure = new_figure(width=5.6, height=4.4)
     with styled():
         plot = figure.subplots()
-        plot.plot([0.45, 1], [0.45, 1], color=INK, linewidth=0.9, linestyle="--", label="honest")
+        plot.plot([0.45, 1], [0.45, 1], color=INK, linewidth=0.9, linestyle="--", label="ideal")
         for item, color, marker in zip(
             pooled(coverages), (BLUE, ORANGE, GREEN), ("o", "s", "^"), strict=False
         ):

@@ -100,5 +100,9 @@ def _anomalies(made: FieldMap) -> Sequence[Table]:
     more = f" {len(every) - ROWS} more are in the file of terragrip map." if len(every) > ROWS else ""
     head = ("quantity", "latitude [°]", "longitude [°]", "area [m²]", "value", "around", "difference ± 95 %")
     return (
-        Table(f"Patches unlike their surroundings; at most 5 % of them by chance.{more}", head, tuple(rows)),
+        Table(
+            f"Patches that differ from their surroundings; at most 5 % of them by chance.{more}",
+            head,
+            tuple(rows),
+        ),
     )

@@ -86,7 +86,7 @@ def online_curve(run: Run, scales: Mapping[str, float], by_whom: str = "of the f
     """
     title = "The curve, known while driving"
     if "curve_a" not in run.estimates:
-        return Section("online", title, omitted="Left out: these estimates carry no online curve.")
+        return Section("online", title, omitted="Left out: these estimates contain no online curve.")
     steps = np.array([scales.get(label, np.nan) for label in run.soil], dtype=np.float64)
     estimate, std = run.estimated("curve_a"), run.estimated("curve_a_std")
     known = run.moving & ~run.stuck & (std < WIDE)
@@ -105,7 +105,7 @@ def online_curve(run: Run, scales: Mapping[str, float], by_whom: str = "of the f
         timeline(run, [lane]),
         f"{'Simulated run' if run.truth is not None else 'Run'} {run.name}: the scale a of µ(s) = a g(s), learned from single pairs "
         f"of slip and adhesion as they come, with its 95 % interval{beside}. With a the whole curve is known at each instant; "
-        "the interval widens where slip is too small to teach, and begins anew where the ground changes.",
+        "the interval widens where slip is too small to determine a, and restarts where the ground changes.",
         f"Scale of the adhesion curve over time in {run.name}",
     )
     return Section("online", title, (), (picture,))
@@ -153,7 +153,7 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
         + (
             "Measured slip comes from the raw speeds, so its SD holds their noise."
             if run.recording is not None
-            else "The sensor's traction stands at the estimated slip."
+            else "The sensor's traction is plotted at the estimated slip."
             if run.sensor_wheel is not None
             else ""
         ),
@@ -189,8 +189,8 @@ def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
                 f"nis-{shown.name}",
                 draw_nis(shown),
                 f"Normalised innovation squared of {simulated}{shown.name}, method {shown.method}, for the "
-                "most common numbers of channels taken (bars; the last bar holds all beyond), and the "
-                "chi-square law that it follows when the noise settings are right (line).",
+                "most common numbers of channels used (bars; the last bar holds all beyond), and the "
+                "chi-square distribution that it follows when the noise settings are right (line).",
                 f"Histogram of NIS of {shown.name} with the chi-square density",
             ),
             nis_table([shown]),

@@ -57,7 +57,7 @@ def both_maxima(
             f"maxima-{_stem(first.name)}",
             draw_both_maxima(first, tire_resistance),
             f"Adhesion µ(s) and tractive efficiency η(s) on {first.name} by the fitted curve{truth}. Most pull and best efficiency "
-            "lie at different slips: the curve says what each costs.",
+            "lie at different slips: the curve shows the cost of each.",
             f"Adhesion and efficiency over slip on {first.name}, both maxima marked",
         )
     ]
