@@ -488,7 +488,7 @@ struct tg_filter {
     int32_t factor_steps;                /* still to be done with factors */
     tg_real x_prior[TG_ROWS];            /* of the last step, before its update */
     tg_passage passage;                  /* of the last step */
-    int32_t taken;                       /* channels of the last step, in the order used */
+    int32_t used;                       /* channels of the last step, in the order used */
     int32_t channel[TG_MAX_CHANNELS];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS]; /* each after the ones before it; without a bank */
     tg_real accelerometer[TG_ROWS];      /* row of H of a_x in the last step */
@@ -509,7 +509,7 @@ struct tg_consider { /* row by row, one lane a column; 0 beyond the last */
 };
 
 struct tg_track {
-    int32_t wheels, states, taken;
+    int32_t wheels, states, used;
     tg_passage passage;                  /* composite; its q is not used */
     tg_real Q[TG_MAX_STATES * TG_MAX_STATES];
 };

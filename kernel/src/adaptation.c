@@ -99,7 +99,7 @@ TG_INLINE void sensitivity_update(tg_adaptation_state *s, const tgi_plan *plan, 
     }
 }
 
-/* X <- T^-1 X T^-T over the first `count` channels taken; X by lanes. */
+/* X <- T^-1 X T^-T over the first `count` channels used; X by lanes. */
 TG_INLINE void whiten(const tgi_result *result, int count, tg_lanes X[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1], const int n)
 {
     for (int side = 0; side < 2; side++)
@@ -149,7 +149,7 @@ static int remember_innovations(tg_adaptation_state *s, const tg_filter *f, cons
     const tg_real share = -tgi_expm1(-plan->passage.dt / f->tuning.memory);
     tg_real left[TG_MAX_WHEELS + 1], white[TG_MAX_WHEELS + 1]; /* T^-1 of the innovations, and over its SD */
     int count = 0;
-    for (; count < result->taken && result->channel[count] <= n; count++) {
+    for (; count < result->used && result->channel[count] <= n; count++) {
         const int o = result->channel[count];
         left[count] = tgi_sqrt(result->weight[o]) * result->innovation[o];
         for (int b = 0; b < count; b++) left[count] -= result->gain[b][n + 1 + o] * left[b];
@@ -188,9 +188,9 @@ static void copy(tg_adaptation_state *to, const tg_adaptation_state *from, int r
 TG_INLINE int adapt(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
 {
     sensitivity_predict(s, f, plan, n, stride);
-    if (result->taken && remember_innovations(s, f, plan, result) == n + 1 && ++s->updates % f->tuning.stride == 0)
+    if (result->used && remember_innovations(s, f, plan, result) == n + 1 && ++s->updates % f->tuning.stride == 0)
         descend(s, f, result, n, stride);
-    for (int c = 0; c < result->taken; c++) sensitivity_update(s, plan, result, c, n, stride);
+    for (int c = 0; c < result->used; c++) sensitivity_update(s, plan, result, c, n, stride);
     return is_finite(s, n, stride);
 }
 

@@ -1,5 +1,5 @@
 /* A bank of four exact filters over the scale of Q, mixed as interacting multiple models (Blom and Bar-Shalom 1988). One lane a mode:
- * every operation is done for all four at once. By factors, algebra as in factor.h, but row by row, since lanes are taken by the modes. */
+ * every operation is done for all four at once. By factors, algebra as in factor.h, but row by row, since lanes are used by the modes. */
 #include "bank.h"
 
 #define PROBABILITY_MIN ((tg_real)1e-12)
@@ -137,7 +137,7 @@ TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lan
 TG_INLINE void bank_update_channel(const tgi_plan *plan, tgi_update *out, int o, const tg_lanes *along, int first, tg_lanes residual, const int n)
 {
     tgi_modes *const m = &out->state;
-    tg_lanes *const K = out->gain[out->taken];
+    tg_lanes *const K = out->gain[out->used];
     tg_lanes variance = lanes_all(plan->r[o] / out->weight[o]), inverse = lanes_div(lanes_all(1), variance);
     for (int i = 0; i < TG_TWICE(n); i++) K[i] = bank_zeros();
     for (int k = first; k < TG_TWICE(n); k++) {
@@ -193,7 +193,7 @@ TG_INLINE tg_lanes coupling(const tgi_plan *plan, const tgi_update *out, int c, 
  * steps share. */
 TG_INLINE tg_real mixture_nis(const tgi_plan *plan, const tgi_update *out, const int n)
 {
-    const int count = out->taken;
+    const int count = out->used;
     tg_lanes T[TG_MAX_CHANNELS][TG_MAX_CHANNELS];
     tg_real S[TG_MAX_CHANNELS][TG_MAX_CHANNELS], nu[TG_MAX_CHANNELS], least[TG_MAX_CHANNELS];
     for (int c = 0; c < count; c++) {
@@ -221,8 +221,8 @@ static tg_real weigh(const tgi_update *out, tg_real *probability)
         if (volume > TG_TINY && volume < 1 / TG_TINY)
             log_volume = tgi_log(volume);
         else
-            for (int c = 0; c < out->taken; c++) log_volume += tgi_log(lanes_at(out->variance[c], b));
-        logs[b] = -(lanes_at(out->nis, b) + log_volume + (tg_real)out->taken * TG_LN_2PI) / 2;
+            for (int c = 0; c < out->used; c++) log_volume += tgi_log(lanes_at(out->variance[c], b));
+        logs[b] = -(lanes_at(out->nis, b) + log_volume + (tg_real)out->used * TG_LN_2PI) / 2;
         if (logs[b] > largest) largest = logs[b];
     }
     for (int b = 0; b < TG_MODES; b++) {
@@ -252,7 +252,7 @@ static int is_finite(const tgi_update *out, int rows)
 static void report(const tg_filter *f, const tgi_plan *plan, const tgi_update *out, tg_real nis, tg_real log_likelihood, tg_step *step)
 {
     memset(step, 0, sizeof *step);
-    step->channels = out->taken;
+    step->channels = out->used;
     step->nis = nis;
     step->log_likelihood = log_likelihood;
     for (int o = 0; o < f->channels; o++) {
@@ -273,7 +273,7 @@ TG_INLINE void work_out(const tg_filter *f, const tgi_plan *plan, int mixes, con
     tg_lanes S[TG_MAX_CHANNELS];
     load(f, &before);
     out->probability = lanes_load(f->policy.bank.probability);
-    out->taken = 0;
+    out->used = 0;
     out->nis = bank_zeros();
     out->volume = lanes_all(1);
     if (mixes) mix(f, &before, &out->probability, &a);
@@ -293,11 +293,11 @@ TG_INLINE void commit(tg_filter *f, const tgi_plan *plan, const tgi_update *out,
     tg_bank_state *const bank = &f->policy.bank;
     store(f, &out->state);
     for (int b = 0; b < TG_MODES; b++) bank->probability[b] = probability[b];
-    for (int c = 0; c < out->taken; c++) {
+    for (int c = 0; c < out->used; c++) {
         f->channel[c] = out->channel[c];
         for (int i = 0; i < TG_TWICE(n); i++) lanes_store(bank->gain[c][i], out->gain[c][i]);
     }
-    for (int i = 0; out->taken && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
+    for (int i = 0; out->used && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
     memcpy(f->x_prior, out->x_prior, sizeof(tg_real) * (size_t)f->states);
     if (mixes) {
         bank->mixed = f->clock;

@@ -15,7 +15,7 @@ typedef struct {
     tg_lanes nis, volume;
     tg_real x_prior[TG_ROWS];
     tg_real innovation[TG_MAX_CHANNELS], innovation_variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS];
-    int32_t taken, channel[TG_MAX_CHANNELS];
+    int32_t used, channel[TG_MAX_CHANNELS];
 } tgi_update;
 
 TG_INLINE tg_lanes bank_zeros(void) { return lanes_all(0); }
@@ -91,8 +91,8 @@ TG_INLINE void bank_note(tgi_update *out, int o, tg_lanes residual, tg_lanes var
 {
     out->nis = lanes_mul_add(lanes_mul(residual, residual), inverse, out->nis);
     out->volume = lanes_mul(out->volume, variance);
-    out->channel[out->taken] = o;
-    out->residual[out->taken] = residual;
-    out->variance[out->taken++] = variance;
+    out->channel[out->used] = o;
+    out->residual[out->used] = residual;
+    out->variance[out->used++] = variance;
 }
 #endif

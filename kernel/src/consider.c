@@ -52,7 +52,7 @@ TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_de
 /* Through the gains of the channels used, each after those before it; one SD shifts its residual by `shift`. */
 TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, const int n, const int lanes)
 {
-    for (int m = 0; m < f->taken; m++) {
+    for (int m = 0; m < f->used; m++) {
         const int o = f->channel[m];
         tg_real shift[TG_MAX_CONSIDERED];
         EACH(k)
@@ -82,7 +82,7 @@ static void mean_gains(const tg_filter *f, tg_real (*mean)[TG_ROWS])
 {
     const tg_bank_state *const bank = &f->policy.bank;
     const tg_lanes probability = lanes_load(bank->probability);
-    for (int m = 0; m < f->taken; m++)
+    for (int m = 0; m < f->used; m++)
         for (int i = 0; i < f->states; i++) mean[m][i] = lanes_sum(lanes_mul(probability, lanes_load(bank->gain[m][i])));
 }
 

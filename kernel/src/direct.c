@@ -130,20 +130,20 @@ TG_INLINE void update_channel(channel_updates *t, int o, const tgi_gain *h, tg_r
 {
     tgi_direct *const out = t->out;
     const tg_real r = t->r[o], S = product + r, inverse = 1 / S;
-    tgi_gain *const K = &out->gain[out->taken];
+    tgi_gain *const K = &out->gain[out->used];
     block_update(&out->P, h, inverse, K, n);
     const tg_lanes nu = lanes_all(residual);
     out->x.mu = lanes_mul_add(nu, K->mu, out->x.mu);
     out->x.rest = lanes_mul_add(nu, K->rest, out->x.rest);
     out->x.omega = lanes_mul_add(nu, K->omega, out->x.omega);
     tgi_result *const result = out->result;
-    result->channel[out->taken] = o;
-    result->residual[out->taken] = residual;
-    result->residual_variance[out->taken] = S;
+    result->channel[out->used] = o;
+    result->residual[out->used] = residual;
+    result->residual_variance[out->used] = S;
     result->square += residual * residual * inverse;
     result->volume *= S;
     t->noise *= r;
-    out->taken++;
+    out->used++;
 }
 
 TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(lanes_mul(a, b)); }
@@ -173,7 +173,7 @@ TG_INLINE shock shock_of(const tgi_block *P, tg_lanes a, tg_real a_rho, const in
     return s;
 }
 
-typedef struct { /* S less what neighbouring steps share, of the wheels that are left, and their innovations; the sum of those taken out */
+typedef struct { /* S less what neighbouring steps share, of the wheels that are left, and their innovations; the sum of those used out */
     tg_lanes W[TG_LANES], nu;
     tg_real sum;
 } nis_square;
@@ -285,14 +285,14 @@ TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *
     out->x.rest = lanes_of(x[n], (x[n + 1] - m.g * x[n]) + dot(m.c, mu) + shift[n + 1], 0, 0);
     out->x.omega = lanes_add(lanes_mul_add(m.b, mu, lanes_mul(m.phi, omega)), load_wheels(shift + n + 2, n));
     out->x_prior = out->x;
-    out->taken = out->judged = 0;
+    out->used = out->judged = 0;
     out->result->square = 0;
     out->result->volume = 1;
     channel_updates t;
     t.out = out;
     t.noise = 1;
     if (plan->count) update_channels(f, plan, &t, n);
-    out->result->taken = out->taken;
+    out->result->used = out->used;
     return t.noise >= TGI_NOISE_SHARE * out->result->volume && is_finite(out, n);
 }
 
@@ -324,7 +324,7 @@ TG_INLINE void store_row(tg_real *to, tg_lanes mu, tg_lanes rest, tg_lanes omega
 
 void tgi_direct_gains(const tgi_direct *out, tg_real (*gain)[TG_ROWS], int n)
 {
-    for (int c = 0; c < out->taken; c++) store_row(gain[c], out->gain[c].mu, out->gain[c].rest, out->gain[c].omega, n);
+    for (int c = 0; c < out->used; c++) store_row(gain[c], out->gain[c].mu, out->gain[c].rest, out->gain[c].omega, n);
 }
 
 void tgi_direct_commit(tg_filter *f, const tgi_direct *out)

@@ -29,7 +29,7 @@ typedef struct { /* of the rows of mu only what is against mu */
 typedef struct {
     tgi_block P;
     tgi_gain x, x_prior, gain[TG_LANES + 2];
-    int32_t taken;
+    int32_t used;
     int32_t judged;     /* nis of the result is there: every wheel was measured, and something is shared */
     tgi_result *result; /* of it: channels, residuals, innovations, weights, nis, volume */
 } tgi_direct;

@@ -27,14 +27,14 @@ TG_INLINE void exact_predict(const tg_filter *f, const tgi_factors *from, const 
 TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int o, const tg_real *along, const tg_real *coupling,
                           int first, tg_real residual, const int n, const int stride)
 {
-    const int taken = out->taken;
-    tg_real *const gain = out->gain[taken];
+    const int used = out->used;
+    tg_real *const gain = out->gain[used];
     tg_real spread[TG_ROWS], sum = 0, innovation = residual, variance = plan->r[o];
     for (int k = first; k < TG_TWICE(n); k++) {
         sum += out->d[k] * along[k] * along[k];
         spread[k] = sum;
     }
-    for (int c = 0; c < taken; c++) {
+    for (int c = 0; c < used; c++) {
         innovation += coupling[c] * out->residual[c];
         variance += coupling[c] * coupling[c] * out->residual_variance[c];
     }
@@ -44,15 +44,15 @@ TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result
     const tg_real inverse = factor_measure(out->u, out->d, along, spread, first, TG_TWICE(n), stride, r, gain);
     for (int i = 0; i < stride; i += TG_LANES)
         lanes_store(out->x + i, lanes_mul_add(lanes_all(residual), lanes_load(gain + i), lanes_load(out->x + i)));
-    out->channel[taken] = o;
-    out->residual[taken] = residual;
-    out->residual_variance[taken] = r + sum;
+    out->channel[used] = o;
+    out->residual[used] = residual;
+    out->residual_variance[used] = r + sum;
     out->square += residual * residual * inverse;
     out->volume *= r + sum;
     out->innovation[o] = innovation;
     out->variance[o] = variance;
     out->weight[o] = weight;
-    out->taken = taken + 1;
+    out->used = used + 1;
 }
 
 TG_INLINE void exact_take_output(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int j, const int n, const int stride)
@@ -61,7 +61,7 @@ TG_INLINE void exact_take_output(const tg_filter *f, const tgi_plan *plan, tgi_r
     tg_real along[TG_ROWS], coupling[TG_MAX_CHANNELS];
     if (!plan->present[o]) return;
     for (int k = j; k < TG_TWICE(n); k++) along[k] = out->u[k * stride + j];
-    for (int c = 0; c < out->taken; c++) coupling[c] = out->gain[c][j];
+    for (int c = 0; c < out->used; c++) coupling[c] = out->gain[c][j];
     exact_update(f, plan, out, o, along, coupling, j, plan->y[o] - out->x[j], n, stride);
 }
 
@@ -73,7 +73,7 @@ TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan
         along[k] = 0;
         for (int i = 0; i <= n; i++) along[k] += h[i] * out->u[k * stride + i];
     }
-    for (int c = 0; c < out->taken; c++) {
+    for (int c = 0; c < out->used; c++) {
         coupling[c] = 0;
         for (int i = 0; i <= n; i++) coupling[c] += h[i] * out->gain[c][i];
     }
@@ -88,7 +88,7 @@ void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan 
     exact_predict(f, from, plan, W, weight, out->x, n, stride);
     for (int i = 0; i < stride; i += TG_LANES) lanes_store(out->x_prior + i, lanes_load(out->x + i));
     for (int j = rows; j < stride; j++) out->d[j] = 0;
-    out->taken = 0;
+    out->used = 0;
     out->square = 0;
     out->volume = 1;
     tgi_gram gram = tgi_factor_begin(W, weight, rows, stride);

@@ -65,7 +65,7 @@ static const tgi_field supervisor[] = {REALS(T, value), DOUBLES(T, time), REALS(
 #define T tg_filter
 const tgi_field tgi_filter_fields[] = {
     DOUBLES(T, clock), REALS(T, slope), REALS(T, cosine), REALS(T, sine), REALS(T, x), REALS(T, d), REALS(T, u), REALS(T, P), INTEGERS(T, formed),
-    INTEGERS(T, factor_steps), REALS(T, x_prior), REALS(T, passage), INTEGERS(T, taken), INTEGERS(T, channel), REALS(T, gain),
+    INTEGERS(T, factor_steps), REALS(T, x_prior), REALS(T, passage), INTEGERS(T, used), INTEGERS(T, channel), REALS(T, gain),
     REALS(T, accelerometer), END};
 #undef T
 #define T tg_adaptation_state

@@ -132,8 +132,8 @@ static tg_real log_likelihood(const tgi_result *result)
     if (result->volume > TG_TINY && result->volume < 1 / TG_TINY)
         logs = tgi_log(result->volume);
     else
-        for (int c = 0; c < result->taken; c++) logs += tgi_log(result->residual_variance[c]);
-    return -(result->square + logs + (tg_real)result->taken * TG_LN_2PI) / 2;
+        for (int c = 0; c < result->used; c++) logs += tgi_log(result->residual_variance[c]);
+    return -(result->square + logs + (tg_real)result->used * TG_LN_2PI) / 2;
 }
 
 TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int stride)
@@ -152,7 +152,7 @@ TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int 
 /* What a step leaves besides the belief. */
 TG_INLINE void commit_channels(tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n)
 {
-    for (int c = 0; c < result->taken; c++) f->channel[c] = result->channel[c];
+    for (int c = 0; c < result->used; c++) f->channel[c] = result->channel[c];
     for (int i = 0; plan->count && i <= n; i++) f->accelerometer[i] = plan->accelerometer[i];
 }
 
@@ -164,7 +164,7 @@ TG_INLINE void commit(tg_filter *f, const tgi_result *result, const int n, const
         lanes_store(f->d + i, lanes_load(result->d + i));
         lanes_store(f->x_prior + i, lanes_load(result->x_prior + i));
     }
-    for (int c = 0; c < result->taken; c++)
+    for (int c = 0; c < result->used; c++)
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(f->gain[c] + i, lanes_load(result->gain[c] + i));
     f->formed = 0;
     tgi_count_factors(f);
@@ -174,7 +174,7 @@ TG_INLINE void commit(tg_filter *f, const tgi_result *result, const int n, const
 TG_INLINE void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan, const int n)
 {
     plan_copy_passage(&f->passage, &plan->passage, n);
-    f->taken = plan->count;
+    f->used = plan->count;
     f->clock += (double)call->dt;
     f->slope[0] = call->before->slope;
     f->cosine[0] = plan->cosine[0];
@@ -188,7 +188,7 @@ TG_INLINE void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan
 TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_real *scale, tg_step *out, const int n)
 {
     memset(out, 0, sizeof *out);
-    out->channels = result->taken;
+    out->channels = result->used;
     out->nis = result->nis;
     out->log_likelihood = result->log_likelihood;
     out->gamma = plan->gamma;

@@ -31,13 +31,13 @@ typedef struct { /* one step, worked out before any state is touched; rows in ro
 typedef struct { /* what a step comes to, before it is known to be sound */
     tg_real x[TG_ROWS], d[TG_ROWS], u[TG_MAX_STATES * TG_ROWS]; /* 0 beyond the last row */
     tg_real x_prior[TG_ROWS];
-    int32_t taken;
+    int32_t used;
     int32_t channel[TG_MAX_CHANNELS];
     tg_real gain[TG_MAX_CHANNELS][TG_ROWS];  /* each after the channels before it */
     tg_real residual[TG_MAX_CHANNELS];       /* innovation after the channels before it, and its variance */
     tg_real residual_variance[TG_MAX_CHANNELS];
     tg_real innovation[TG_MAX_CHANNELS], variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS]; /* prior */
-    tg_real square, volume; /* sum of residual^2/variance and product of the variances, over the channels taken */
+    tg_real square, volume; /* sum of residual^2/variance and product of the variances, over the channels used */
     tg_real nis;            /* the sum without what neighbouring steps share */
     tg_real log_likelihood;
 } tgi_result;
@@ -88,7 +88,7 @@ void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P); /* row order,
 void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage);
 void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); /* as tgi_factors_of */
 
-/* nis.c: S of the channels taken to nu' S^-1 nu, S less what neighbouring steps share, as a filter with one lane left it. */
+/* nis.c: S of the channels used to nu' S^-1 nu, S less what neighbouring steps share, as a filter with one lane left it. */
 tg_real tgi_nis(const tgi_plan *plan, const tgi_result *result, int n);
 /* nu' S^-1 nu of `count` channels, by the lower triangle of S; both are used up. No pivot falls below `least`. */
 tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, const tg_real *least);

@@ -71,6 +71,6 @@ tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outp
         if (f->tuning.policy != TG_FIXED) restart_sensitivities(f);
     }
     f->passage = passage;
-    f->taken = 0;
+    f->used = 0;
     return TG_OK;
 }

@@ -1,13 +1,13 @@
 /* Vertical loads of axles and wheels (physics.md 3), and the inputs of a row. */
 #include "estimator.h"
 
-#define TG_LEAST_MASS ((tg_real)0.2)  /* of the machine's: what a mass or what hangs on the hitch may be, beyond it is a defect of the log */
+#define TG_LEAST_MASS ((tg_real)0.2)  /* of the machine's: bounds of mass and hitch load; beyond them is a defect of the log */
 #define TG_MOST_MASS 10
 #define TG_LEAST_HITCH ((tg_real)-0.5) /* of the weight */
 #define TG_MOST_HITCH 2
 
-/* Take a sample of mass or hitch load, between limits. */
-static void take(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot, tg_real least, tg_real most)
+/* Update mass or hitch load with a sample, within limits. */
+static void bounded_input(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot, tg_real least, tg_real most)
 {
     const tg_real x = row->value[slot];
     const int32_t defect = x < least || x > most;
@@ -23,8 +23,8 @@ void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive)
     const tg_real mass = s->machine.mass, weight = mass * s->machine.gravity;
     drive->mass = mass;
     drive->inverse_mass = e->constants.inverse_mass;
-    if (s->weighed) take(e, &e->mass, row, TG_MASS, TG_LEAST_MASS * mass, TG_MOST_MASS * mass);
-    if (s->carrying) take(e, &e->hitch_load, row, TG_HITCH_LOAD, TG_LEAST_HITCH * weight, TG_MOST_HITCH * weight);
+    if (s->weighed) bounded_input(e, &e->mass, row, TG_MASS, TG_LEAST_MASS * mass, TG_MOST_MASS * mass);
+    if (s->carrying) bounded_input(e, &e->hitch_load, row, TG_HITCH_LOAD, TG_LEAST_HITCH * weight, TG_MOST_HITCH * weight);
     if (e->mass.count > 0) {
         drive->mass = e->mass.value;
         drive->inverse_mass = 1 / e->mass.value;
@@ -71,8 +71,8 @@ static tg_real specific_force(tg_estimator *e, const tg_row *row)
     return e->balance.seen ? e->balance.value : 0;
 }
 
-/* A value measured on an axle wins; axles without one share the rest of the weight by their static shares. */
-static void take_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_real *load)
+/* A load measured on an axle is used; axles without one share the rest of the weight by their static shares. */
+static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_real *load)
 {
     const tg_settings *s = &e->settings;
     int32_t measured[8], any = 0;
@@ -118,7 +118,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
         for (int32_t k = 0; k < s->axles; k++) load[k] += s->payload_share[k] * more + s->hitch_share[k] * drive->hitch_load;
         weight += more + drive->hitch_load;
     }
-    take_measured(e, row, weight, load);
+    use_measured(e, row, weight, load);
 
     tg_real lateral = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, s->load_filter);
     if (!e->lateral.seen && !isnan(row->value[TG_ROLL])) lateral = g * tgi_sin(row->value[TG_ROLL]);

@@ -31,7 +31,7 @@ static tg_real coupling(const tgi_plan *plan, const tgi_result *result, int c, i
 tg_real tgi_nis(const tgi_plan *plan, const tgi_result *result, int n)
 {
     tg_real T[TG_MAX_CHANNELS][TG_MAX_CHANNELS], S[TG_MAX_CHANNELS][TG_MAX_CHANNELS], nu[TG_MAX_CHANNELS], least[TG_MAX_CHANNELS];
-    for (int c = 0; c < result->taken; c++) {
+    for (int c = 0; c < result->used; c++) {
         const int o = result->channel[c];
         nu[c] = result->innovation[o];
         least[c] = plan->r[o];
@@ -42,5 +42,5 @@ tg_real tgi_nis(const tgi_plan *plan, const tgi_result *result, int n)
             for (int k = 0; k <= b; k++) S[c][b] += T[c][k] * T[b][k] * result->residual_variance[k];
         }
     }
-    return tgi_quadratic(result->taken, S, nu, least);
+    return tgi_quadratic(result->used, S, nu, least);
 }

@@ -112,7 +112,7 @@ static void track_restart(tg_track *t)
     tg_passage *const p = &t->passage;
     memset(p, 0, sizeof *p);
     memset(t->Q, 0, sizeof t->Q);
-    t->taken = 0;
+    t->used = 0;
     p->keep = 1;
     for (int i = 0; i < t->wheels; i++) p->phi[i] = 1;
 }
@@ -128,7 +128,7 @@ tg_status tg_track_init(tg_track *t, const tg_filter *f)
 
 tg_status tg_track_step(tg_track *t, const tg_filter *f)
 {
-    if (!t || !f || t->wheels != f->wheels || t->taken) return TG_BAD_ARGUMENT;
+    if (!t || !f || t->wheels != f->wheels || t->used) return TG_BAD_ARGUMENT;
     const int n = t->wheels, states = t->states;
     const tg_passage *const step = &f->passage;
     tg_passage *const whole = &t->passage;
@@ -145,7 +145,7 @@ tg_status tg_track_step(tg_track *t, const tg_filter *f)
     }
     whole->g = step->keep * whole->g + step->g;
     whole->keep *= step->keep;
-    t->taken = f->taken;
+    t->used = f->used;
     return TG_OK;
 }
 

@@ -66,8 +66,8 @@ static int is_within(int32_t x, int32_t low, int32_t high)
 /* What the filter counts and indexes by. */
 static int filter_is_sound(const tg_filter *f)
 {
-    if (!is_within(f->taken, 0, f->channels) || !is_within(f->formed, 0, 1) || !is_within(f->factor_steps, 0, 1000)) return 0;
-    for (int32_t c = 0; c < f->taken; c++)
+    if (!is_within(f->used, 0, f->channels) || !is_within(f->formed, 0, 1) || !is_within(f->factor_steps, 0, 1000)) return 0;
+    for (int32_t c = 0; c < f->used; c++)
         if (!is_within(f->channel[c], 0, f->channels - 1)) return 0;
     if (f->tuning.policy == TG_FIXED) return 1;
     if (f->tuning.policy == TG_BANK) return is_within(f->policy.bank.updates, 0, INT_MAX / 2);

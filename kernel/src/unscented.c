@@ -122,16 +122,16 @@ TG_INLINE void unscented_update(const tg_filter *f, const tgi_plan *plan, const 
         }
         residual[a] = out->innovation[c];
         for (int b = n + 1; b > a; b--) residual[a] -= u[b][rows + a] * residual[b];
-        out->channel[out->taken] = c;
-        out->residual[out->taken] = residual[a];
-        out->residual_variance[out->taken] = d[a];
+        out->channel[out->used] = c;
+        out->residual[out->used] = residual[a];
+        out->residual_variance[out->used] = d[a];
         out->square += residual[a] * residual[a] / d[a];
         out->volume *= d[a];
         for (int i = 0; i < stride; i++) {
-            out->gain[out->taken][i] = i < rows ? u[a][i] : 0;
-            out->x[i] += out->gain[out->taken][i] * residual[a];
+            out->gain[out->used][i] = i < rows ? u[a][i] : 0;
+            out->x[i] += out->gain[out->used][i] * residual[a];
         }
-        out->taken++;
+        out->used++;
     }
 }
 
@@ -139,7 +139,7 @@ void tgi_unscented_step(const tg_filter *f, const tgi_plan *plan, tgi_result *ou
 {
     const int n = f->wheels, stride = f->stride, joint = (TG_TWICE(n) + n + 2 + TG_LANES - 1) / TG_LANES * TG_LANES;
     const weights w = unscented_weights(&f->tuning, n);
-    out->taken = 0;
+    out->used = 0;
     out->square = 0;
     out->volume = 1;
     for (int j = TG_TWICE(n); j < stride; j++) out->d[j] = 0;

@@ -90,7 +90,7 @@ def coverage(
 ) -> float:
     """Share of rows whose truth lies in the central normal interval of `probability`, (n,) each.
 
-    The interval is estimate ± z std. Honest intervals give `probability` back, up to the luck of the few
+    The interval is estimate ± z std. Intervals that are right give `probability` back, up to the luck of the few
     constants (gains, offsets) that one run draws. Raises InputError when no row is finite or the
     probability is not inside (0, 1).
     """

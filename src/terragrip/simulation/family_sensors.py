@@ -18,7 +18,7 @@ channels, more noise, no accelerometer."""
 
 
 def uncertainty(sensors: Tree, machine: Machine, slope: float) -> Tree:
-    """What an honest user writes down of what is not known: the spreads that gains, offsets and radius were drawn with."""
+    """What a careful user states as unknown: the spreads that gains, offsets and radius were drawn with."""
     torque = sensors["drive_torque"]
     return {
         "drive_torque_gain": torque["gain_sd"],

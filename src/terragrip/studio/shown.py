@@ -41,7 +41,7 @@ class Shown:
 
     A name is a column, its 95 % limit (``slip_rl:low``, ``slip_rl:high``), a channel of the recording (``measured:ground_speed``), the
     place on an axis (``axis:time``, ``axis:elapsed``, ``axis:distance``) or a formula (``=slip_rl - slip_rr``; see `formulas`).
-    Of the filter's consistency: ``nis:mean`` is the sum of NIS over that of the channels within `MEAN` seconds, 1 of an honest filter;
+    Of the filter's consistency: ``nis:mean`` is the sum of NIS over that of the channels within `MEAN` seconds, 1 if the noise is right;
     ``nis:low`` and ``nis:high`` are the 95 % limits of that mean by chi-squared, were the rows independent.
     """
 
