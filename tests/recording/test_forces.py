@@ -7,6 +7,7 @@ import pytest
 
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.forces import Range
+from terragrip.simulation import simulate
 from terragrip.vehicle import Vehicle
 
 G, MASS, RADIUS, INERTIA = 9.80665, 600.0, 0.4, 3.0
@@ -131,3 +132,9 @@ def test_what_slows_the_vehicle_and_not_the_rims_says_nothing_of_the_mass() -> N
 )
 def test_a_factor_is_off_where_all_of_its_interval_is(low: float, high: float, off: bool) -> None:
     assert Range((low + high) / 2, low, high).is_off(1.3) is off
+
+
+def test_one_start_alone_shows_nothing() -> None:
+    """Exact channels, one start with a tool that digs in meanwhile: nothing shows the scatter from start to start."""
+    run = simulate("constant", 7)
+    assert unit_warnings(run.recording, run.vehicle) == []

@@ -29,6 +29,7 @@ _MOVING = 0.1  # of the speed that a twentieth of the drive exceeds
 _SLIP = 0.3  # beyond, resistance grows with the pull
 _LEAST = 20.0  # s of driving
 _BLOCKS = 12  # for the jackknife
+_ALONE = 0.8  # share of the rims' change in one block: a single start has no scatter to be judged by
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
 _ACCELERATION = 1.8  # an accelerometer's scale, and what a late ground speed makes of it
@@ -137,6 +138,8 @@ class Courses:
             ]
         )
         whole = sums.sum(axis=0)
+        if np.max(np.bincount(block, self.rims**2)) > _ALONE * np.sum(self.rims**2):
+            return None
         tables = np.concatenate([whole[None], whole - sums])
         if not (np.linalg.matrix_rank(tables[..., :-1]) == len(inside)).all():
             return None
