@@ -1,4 +1,4 @@
-/** What `terragrip advise` says of a run, soil by soil, asked for when the panel is opened. */
+/** Results of `terragrip advise` for a run, soil by soil, requested when the panel is opened. */
 
 import { get } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";

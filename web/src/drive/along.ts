@@ -18,7 +18,7 @@ export const AXES: Record<Axis, { title: string; unit: string }> = {
 export interface Layer {
   path: string;
   run: Run;
-  /** A short name that tells it from the others. */
+  /** A short name that distinguishes it from the others. */
   label: string;
   way: Way;
   /** By formula: why this run cannot be given it; null where it can. */
@@ -86,7 +86,7 @@ export class Way {
   }
 }
 
-/** A run as a layer; raises what the server says where it cannot be read or has no such axis. */
+/** A run as a layer; raises the server's message where it cannot be read or has no such axis. */
 export async function layerOf(path: string, axis: Axis, run?: Run): Promise<Layer> {
   const about = run ?? (await get<Run>("drive", { path }));
   let coarse: Points | null = null;
@@ -97,7 +97,7 @@ export async function layerOf(path: string, axis: Axis, run?: Run): Promise<Laye
   return { path, run: about, label: path, way: new Way(axis, about, coarse) };
 }
 
-/** Short names that tell paths apart: without the ending, and without the folders and last words that all share. */
+/** Short names that distinguish paths: without the suffix, and without the folders and last words that all share. */
 export function shortNames(paths: string[]): string[] {
   const parts = paths.map((path) => path.replace(/\.parquet$/, "").split(/(?<=[/_-])/));
   const same = (pick: (one: string[]) => string | undefined): boolean => parts.length > 1 && parts.every((one) => one.length > 1 && pick(one) === pick(parts[0] as string[]));

@@ -1,4 +1,4 @@
-/** The vertical axis of a chart: what it spans, and what lies beyond it. */
+/** The vertical axis of a chart: its limits, and the values beyond them. */
 
 import type uPlot from "uplot";
 import { digits } from "../ui/dom";
@@ -48,7 +48,7 @@ export function outsideOf({ values }: { values: Range }, panel: Panel, [low, hig
   return [values[1] > high ? `▲ up to ${digits(values[1])} ${panel.unit}` : "", values[0] < low ? `▼ down to ${digits(values[0])} ${panel.unit}` : ""];
 }
 
-/** It stands in the chart's corners: nothing is left out in silence. */
+/** Shown in the chart's corners: values beyond the axis are never hidden without a sign. */
 export function beyond(plot: uPlot, panel: Panel, found: { values: Range }): void {
   const { min, max } = plot.scales["y"] ?? {};
   if (typeof min !== "number" || typeof max !== "number") return;

@@ -36,10 +36,10 @@ export class Charts {
   range: Range = [0, 1];
   onCursor: ((time: number | null) => void) | null = null;
   onPick: ((time: number) => void) | null = null;
-  /** A vertical axis was set, or follows its values again. */
+  /** A vertical axis was set, or fits its values again. */
   onUpright: (() => void) | null = null;
   onRange: ((range: Range) => void) | null = null;
-  /** Ends of vertical axes that the user set, in SI, by the panel's key; the others follow their values. */
+  /** Limits of vertical axes set by the user, in SI, by the panel's key; the others fit their values. */
   uprights: Record<string, Range> = {};
   /** The time of the sample that was picked. */
   picked: number | null = null;
@@ -56,7 +56,7 @@ export class Charts {
 
   constructor() {
     const forgets = [
-      onTheme(() => this.main && this.rebuild()), // without a run there stands why there is none
+      onTheme(() => this.main && this.rebuild()), // without a run the reason is shown
       onBrush(() => this.follow()),
       onPoint((path, time) => path === this.path && this.point(time)),
     ];
@@ -104,7 +104,7 @@ export class Charts {
     return this.range[0] <= low && this.range[1] >= high;
   }
 
-  /** The ends of a chart's vertical axis. */
+  /** The limits of a chart's vertical axis. */
   scale(number: number): Range | null {
     const { min, max } = this.plots[number]?.plot.scales["y"] ?? {};
     return typeof min === "number" && typeof max === "number" ? [min, max] : null;
@@ -182,7 +182,7 @@ export class Charts {
     for (const { plot } of this.plots) plot.redraw(false);
   }
 
-  /** Set a vertical axis, in SI; null lets it follow its values. */
+  /** Set a vertical axis, in SI; null fits it to its values. */
   setUpright(key: string, range: Range | null): void {
     if (range && !(range[1] > range[0])) return;
     if (range) this.uprights[key] = range;
@@ -254,7 +254,7 @@ export class Charts {
     void this.fetch();
   }
 
-  /** What the style sheet says; else the charts share the room, down to what can be read; then they scroll. */
+  /** The height by the style sheet; else the charts share the space, down to the least that can be read; then they scroll. */
   private height(): number {
     const many = Math.max(this.plots.length, this.count, 1);
     const set = parseFloat(getComputedStyle(this.element).getPropertyValue("--chart-height"));

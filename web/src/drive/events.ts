@@ -1,4 +1,4 @@
-/** The list of a run's events: next, previous, and what each says. */
+/** The list of a run's events: next, previous, and the explanation of each. */
 
 import { digits, fill, h } from "../ui/dom";
 import { EVENT_COLORS, type Event } from "./run";

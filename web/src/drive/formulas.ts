@@ -35,7 +35,7 @@ export function formulaPanels(layer: Layer, formulas: Formula[]): Panel[] {
     .map((one) => ({ key: keyOf(one), title: one.name, unit: one.unit || "unit not known", about: one.text, scale: 1, traces: [{ column: `=${one.text}`, label: "", color: "blue", band: "", scale: 1 }] }));
 }
 
-/** Ask the server which formulas a run cannot be given, and why; what it said before is not asked again. */
+/** Ask the server which formulas a run cannot compute, and why; answers are kept. */
 export async function check(layer: Layer, texts: string[]): Promise<void> {
   const faults = (layer.faults ??= new Map());
   const open = texts.filter((text) => !faults.has(text));
@@ -139,7 +139,7 @@ export class FormulaList {
     this.name.focus();
   }
 
-  /** Take up other formulas: of a link or a layout, or after a change. */
+  /** Use other formulas: of a link or a layout, or after a change. */
   keep(all: Formula[], made: Formula | null): void {
     this.all = all;
     localStorage.setItem(KEY, JSON.stringify(all));

@@ -66,7 +66,7 @@ export function listenToPointers(over: HTMLElement, moved: Moved): void {
   for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) over.addEventListener(end, (event) => fingers.delete(event.pointerId));
 }
 
-/** The wheel on a vertical axis (with alt also over the chart) zooms it, a drag along it moves it, a double click lets it follow. */
+/** The wheel on a vertical axis (with alt also over the chart) zooms it, a drag along it moves it, a double click fits it to its values. */
 export function listenToUpright(root: HTMLElement, over: HTMLElement, now: () => Range, set: (range: Range | null) => void): void {
   const place = (event: MouseEvent): { share: number; axis: boolean } => {
     const box = over.getBoundingClientRect();

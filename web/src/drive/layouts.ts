@@ -1,4 +1,4 @@
-/** Layouts by name: which panels, wheels and formulas are shown, what is plotted over what and where vertical axes end. Kept by this browser. */
+/** Layouts by name: which panels, wheels and formulas are shown, the pair plotted over each other, and the limits of vertical axes. Stored in this browser. */
 
 import { fill, h } from "../ui/dom";
 import { note } from "../ui/notes";
@@ -27,7 +27,7 @@ function kept(): Record<string, Layout> {
   }
 }
 
-/** The chooser; `now` gives what is shown, `show` takes up a layout. */
+/** The chooser; `now` gives what is shown, `show` applies a layout. */
 export function layouts(now: () => Layout, show: (layout: Layout) => void): HTMLElement {
   const element = h("details", { class: "chooser", id: "layouts" });
   const keep = (all: Record<string, Layout>): void => {

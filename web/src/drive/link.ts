@@ -13,7 +13,7 @@ export interface View {
   panels: string[] | null;
   /** The picked sample's time. */
   at: number | null;
-  /** Ends of vertical axes, in SI, so that a link shows the same in a browser with other units. */
+  /** Limits of vertical axes, in SI, so that a link shows the same in a browser with other units. */
   uprights: Record<string, Range>;
   axis: Axis;
   /** Runs that lie over this one. */

@@ -1,4 +1,4 @@
-/** Several runs in one set of charts: a colour a run, a dash a trace, so that no two look alike to any eye. */
+/** Several runs in one set of charts: a colour a run, a dash a trace, so that no two look the same, also to colour-blind readers. */
 
 import { h, fill } from "../ui/dom";
 import { oneAtATime } from "../ui/page";
@@ -36,7 +36,7 @@ function ofRun({ bandColor: _, dash: __, ...trace }: Trace, layer: number, run: 
   return { ...trace, layer, color: runColor(layer), label: `${run} ${trace.label}`.trim(), dash: DASHES[dash] ?? [], dashed: dash };
 }
 
-/** The chooser of runs to lie over the main one; `choose` shows those, and draws this anew with what could be shown. */
+/** The chooser of runs to draw over the main one; `choose` shows them, and redraws this with those that could be shown. */
 export function overlayChooser(choose: (paths: string[]) => Promise<void>): { element: HTMLElement; draw: (runs: string[], main: string, chosen: string[]) => void } {
   const element = h("details", { class: "chooser", id: "overlay" }, h("summary", {}, "Overlay"));
   const menu = h("div", { class: "menu" });

@@ -144,7 +144,7 @@ export const page: Page = (main, { notices, query }) => {
     });
   }
 
-  /** Ask which formulas the runs can be given. */
+  /** Ask the server which formulas the runs can compute. */
   async function known(): Promise<void> {
     const texts = formulas.all.map(({ text }) => text);
     await tried(() => Promise.all(layers.map((layer) => check(layer, texts))));

@@ -17,7 +17,7 @@ export interface Now {
   a_std: number;
 }
 
-/** SD of a beyond which the online curve says nothing and is not drawn. */
+/** SD of a beyond which the online curve is too uncertain to be drawn. */
 const USELESS = 1.0;
 
 /** A quantity as it is shown: its column, title and unit, and the factor from the column to that unit. */

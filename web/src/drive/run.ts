@@ -44,7 +44,7 @@ export interface Run {
 }
 
 export interface Trace {
-  /** Which of the runs shown it is of; the main one unless it says. */
+  /** Index of the run shown that it belongs to; the main one by default. */
   layer?: number;
   /** The column asked of the server. */
   column: string;
@@ -77,7 +77,7 @@ export interface Panel {
   most?: number;
   /** The ends of a logarithmic axis. */
   log?: [number, number];
-  /** What it is, for who does not know. */
+  /** An explanation for those who do not know the quantity. */
   about?: string;
 }
 
@@ -184,7 +184,7 @@ function solid(trace: Trace): Trace {
   return rest;
 }
 
-/** The stretches of soils that the run tells: its labels, else those recognised. */
+/** The stretches of soils of a run: its labels, else those recognised. */
 export function soilsOf(run: Run): Span[] {
   return run.soils.length ? run.soils : (run.ground?.sections ?? []).map((s) => ({ name: s.soil, start: s.start, end: s.end }));
 }

@@ -14,7 +14,7 @@ export class Views {
   private timer = 0;
   private moving = false;
 
-  /** `show` goes to a view; `changed` is called when there is more or less to go back to. */
+  /** `show` applies a view; `changed` is called when the history changes. */
   constructor(
     private show: (range: Range) => void,
     private changed: () => void,

@@ -9,7 +9,7 @@ import type { Curve, FitResult, Parameter, State } from "./state";
 const SYMBOLS: Record<string, string> = { alpha_1: "α₁", alpha_2: "α₂", c1: "c₁", c2: "c₂", c3: "c₃", mobility: "Bn", wheel_numeric: "Cn" };
 const STEPS = 1000;
 const WIDE: Record<string, [number, number]> = {
-  // A slider is of no use over a range that a fit may roam; the number field takes the whole of it.
+  // A slider is of no use over the whole range of a fit; the number field allows all of it.
   a: [0, 3],
   alpha_1: [-0.5, 1],
   alpha_2: [-60, -0.5],
@@ -44,7 +44,7 @@ export class CurvesPanel {
     });
   }
 
-  /** Fit, and say so: a bootstrap takes seconds. A second click waits for nothing. */
+  /** Fit, and show that it runs: a bootstrap takes seconds. A second click does nothing. */
   private async work(fit: (progress: (text: string) => void) => Promise<void>): Promise<void> {
     if (this.working) return;
     this.working = true;

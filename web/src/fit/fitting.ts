@@ -1,4 +1,4 @@
-/** Fits by the server, and which points they take. */
+/** Fits by the server, and the points that they use. */
 
 import { send } from "../ui/api";
 import { note, tried } from "../ui/notes";
@@ -18,8 +18,8 @@ export async function fit(state: State): Promise<void> {
   state.changed("all");
 }
 
-/** Fit a curve to each soil that is shown, by the active curve's model, held parameters and ends; each soil has a curve of its own name.
- * `progress` hears which one is fitted. */
+/** Fit a curve to each soil that is shown, by the active curve's model, held parameters and limits; each soil has a curve of its own name.
+ * `progress` is called with the soil being fitted. */
 export async function fitEach(state: State, progress: (text: string) => void): Promise<void> {
   const form = state.active;
   const soils = state.soils.filter((soil) => soil.shown && (soil.bins.length || soil.points.slip.length));
@@ -46,7 +46,7 @@ export async function fitEach(state: State, progress: (text: string) => void): P
 
 const FITTED = "fitted to ";
 
-/** Fit and take over what was found; false where it failed, which is said. */
+/** Fit and use the result; false where it failed, which is reported. */
 async function fitTo(curve: Curve, data: Record<string, unknown>, source: string): Promise<boolean> {
   const wanted = { model: curve.model, intercept: "intercept" in curve.parameters, fixed: held(curve), bounds: curve.bounds, ...data };
   const found = await tried(() => send<FitResult>("POST", "fit", wanted));
@@ -63,7 +63,7 @@ function held(curve: Curve): Record<string, number> | "free" {
   return Object.keys(values).length ? values : "free";
 }
 
-/** What the fit takes: a soil of estimates by name, else points. */
+/** The data of the fit: a soil of estimates by name, else points. */
 function points(state: State): Record<string, unknown> | null {
   const picture = /^picture:(.*)#(\d+)$/.exec(state.target);
   if (picture) {

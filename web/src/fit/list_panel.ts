@@ -150,7 +150,7 @@ export class ListPanel {
     return h("div", { class: "field" }, h("label", { for: "bins-by" }, "Bins by"), choice);
   }
 
-  /** Lay the bins of all estimates anew. */
+  /** Compute the bins of all estimates again. */
   private async rebin(by: "pull" | "slip"): Promise<void> {
     this.state.by = by;
     for (const path of new Set(this.state.soils.map((soil) => soil.path).filter((one) => one.endsWith(".parquet")))) {

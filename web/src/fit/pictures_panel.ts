@@ -36,7 +36,7 @@ export class PicturesPanel {
     onceReleased(this.element, () => this.draw());
   }
 
-  /** Take pictures that were dropped or pasted; true if there was one. */
+  /** Add pictures that were dropped or pasted; true if there was one. */
   take(files: Iterable<File>): boolean {
     const pictures = [...files].filter((file) => file.type in TYPES);
     for (const file of pictures) void this.add(file);
@@ -87,7 +87,7 @@ export class PicturesPanel {
     this.shown();
   }
 
-  /** Another page changed a calibration: take it over unless it is ours already. */
+  /** Another page changed a calibration: use it unless it is ours already. */
   async renewed(path: string): Promise<void> {
     const mine = this.state.kept.pictures[path];
     if (!mine) return;

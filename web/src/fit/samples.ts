@@ -1,4 +1,4 @@
-/** Curves as samples from the server, which alone knows the models. */
+/** Curves as samples from the server, which alone has the models. */
 
 import { send } from "../ui/api";
 
@@ -55,7 +55,7 @@ export class Sampler {
     private ask: (form: Form) => Promise<Samples> = sampled,
   ) {}
 
-  /** What is known of the curve `id`, perhaps of a moment ago; asks for what is not. */
+  /** The last samples of the curve `id`, perhaps of a moment ago; requests new ones where needed. */
   of(id: string | number, form: Form): Samples | null {
     const key = JSON.stringify([form.model, form.parameters]);
     const known = this.known.get(id) ?? { key: "", samples: null, asking: false };
@@ -75,7 +75,7 @@ export class Sampler {
     try {
       known.samples = await this.ask(asked);
     } catch {
-      known.samples = null; // a curve that the server does not know is not drawn
+      known.samples = null; // a curve unknown to the server is not drawn
     }
     known.key = key;
     known.asking = false;

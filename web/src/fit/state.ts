@@ -99,7 +99,7 @@ export class State {
   models: Model[] = [];
   soils: Soil[] = [];
   images = new Map<string, HTMLImageElement>();
-  /** The soil, or "picture:path#line", that a fit takes. */
+  /** The soil, or "picture:path#line", that a fit uses. */
   target = "";
   /** What bins of estimates are laid over: the vehicle's pull, or the wheel's slip. */
   by: "pull" | "slip" = "pull";
@@ -116,12 +116,12 @@ export class State {
     this.listeners.add(listener);
   }
 
-  /** Say that something changed; "curve" is the quick one, while a slider moves. */
+  /** Report a change; "curve" is the quick one, while a slider moves. */
   changed(what: Change): void {
     for (const listener of this.listeners) listener(what);
   }
 
-  /** A step that undo goes back over. Call when a change is complete. */
+  /** A step of the undo history. Call when a change is complete. */
   commit(): void {
     const now = JSON.stringify(this.kept);
     if (now === this.settled) return;
@@ -155,7 +155,7 @@ export class State {
     left = { kept, soils, images, target, by, past, future, settled, colors };
   }
 
-  /** Take up what was left; false where nothing was. */
+  /** Restore the last state; false where there is none. */
   takeUp(): boolean {
     if (!left) return false;
     Object.assign(this, left);

@@ -48,7 +48,7 @@ export class Alarms {
     void this.audio?.close();
   }
 
-  /** Look at the newest row. */
+  /** Check the newest row. */
   check(now: Reading, event: string): void {
     const unit = unitFor("share");
     const over = (name: string, value: number, limit: number | null): string | false =>

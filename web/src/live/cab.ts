@@ -9,7 +9,7 @@ import { Alarms } from "./alarms";
 import { Feed, of, type Said } from "./feed";
 import { ageOf, brief, eventNow, LINGER, reading, seconds, WARNING, type Figure } from "./numbers";
 
-const LOOK = 100; // ms
+const CHECK = 100; // ms
 
 export const page: Page = (main, { query }) => {
   const replay = query.get("replay");
@@ -69,7 +69,7 @@ export const page: Page = (main, { query }) => {
     });
   }
 
-  /** How old the numbers are; what is old is struck out and says so in the largest letters of the page. */
+  /** The age of the numbers; old ones are struck out, with a message in the largest letters of the page. */
   function look(): void {
     const { isOld, predicted, waiting, unmeasured } = ageOf(feed, delay, speed, false);
     const dead = isOld || waiting || feed.state !== "connected";
@@ -79,7 +79,7 @@ export const page: Page = (main, { query }) => {
     age.textContent = dead || predicted ? `${said}${feed.state === "lost" ? ` (${why})` : feed.state === "ended" ? " (the run has ended)" : ""}` : `measured ${seconds(unmeasured)} ago`;
     alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }
-  const watch = window.setInterval(look, LOOK);
+  const watch = window.setInterval(look, CHECK);
   // A tablet that goes dark shows nothing at all; where the browser has no such lock, its own settings must keep it awake.
   let lock: WakeLockSentinel | null = null;
   const wake = (): void => {

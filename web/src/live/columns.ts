@@ -27,7 +27,7 @@ export class Columns {
   least = Infinity;
   most = -Infinity;
 
-  /** Take one column's rows, those measured (0) or those predicted (1). */
+  /** Add one column's rows, those measured (0) or those predicted (1). */
   take(ring: Ring, values: Float64Array, predicted: 0 | 1, { first, begin, end, pixels }: Window): void {
     if (this.low.length < pixels) [this.low, this.high, this.holds] = [new Float64Array(pixels), new Float64Array(pixels), new Uint8Array(pixels)];
     const { low, high, holds } = this;

@@ -35,7 +35,7 @@ export function of(vehicle: string): Record<string, string> {
 
 export type State = "connecting" | "connected" | "lost" | "ended";
 
-/** Rows that the ring holds: 10 minutes at 100 Hz, to look back on while it records. */
+/** Rows that the ring holds: 10 minutes at 100 Hz, to look back at while it records. */
 export const RING = 60_000;
 const HEAD = 3;
 
@@ -55,7 +55,7 @@ export class Ring {
     this.taken = 0;
   }
 
-  /** Take the rows of one message; returns how many. */
+  /** Add the rows of one message; returns how many. */
   take(buffer: ArrayBuffer): number {
     const values = new Float64Array(buffer);
     const width = HEAD + this.names.length;
@@ -149,7 +149,7 @@ export class Feed {
     this.socket?.close();
   }
 
-  /** Begin anew, with what `query` says now. */
+  /** Restart, with the present `query`. */
   again(): void {
     clearTimeout(this.timer);
     const old = this.socket;

@@ -1,4 +1,4 @@
-/** What the live page and the cab page say: the numbers of the newest row, and how old they are. */
+/** The numbers of the live page and the cab page: those of the newest row, and their age. */
 
 import { digits } from "../ui/dom";
 import { fixed, unitFor } from "../ui/units";
@@ -9,13 +9,13 @@ export const WARNING: Record<string, string> = {
   stuck: "Stuck",
   push: "The tool pushes",
 };
-/** Seconds that a warning stands after its last row. */
+/** Seconds that a warning is shown after its last row. */
 export const LINGER = 2;
-/** Seconds after which a status says nothing of now (one comes every second). */
+/** Seconds after which a status is out of date (one comes every second). */
 export const STATUS_AGE = 2.5;
 const STANDING = 0.05; // m/s
 
-/** A number for alarms, NaN where it is not known; and as it is shown: its digits, and what stands below. */
+/** A number for alarms, NaN where it is not known; and as it is shown: its digits, and the text below. */
 export interface Figure {
   value: number;
   shown: [string, string];
@@ -81,7 +81,7 @@ export function oldSaid(predicted: boolean, age: number, ended: boolean): string
     : `These numbers are ${seconds(age)} old${ended ? ": the run has ended" : ": no new rows"}.`;
 }
 
-/** What a driver can read at a glance: what happens, without the figures and the rule after it, which the list of events tells. */
+/** What a driver can read at a glance: the event, without the figures and the rule after it, which are in the list of events. */
 export function brief(text: string): string {
   return text.split(": ")[0] ?? text;
 }

@@ -13,8 +13,8 @@ import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } fr
 import { SetpointLine, type Setpoint } from "./setpoint";
 import { Traces, type Trace } from "./traces";
 
-/** Seconds between looks at how old the last row is, and after which a status says nothing of now (one comes every second). */
-const LOOK = 0.1;
+/** Seconds between checks of the last row's age, and after which a status is out of date (one comes every second). */
+const CHECK = 0.1;
 const STATUS_AGE = 2.5;
 
 /** Seconds that the traces can show. */
@@ -84,7 +84,7 @@ export const page: Page = (main, { notices, query }) => {
     said,
   );
 
-  /** Where the traces stand among the rows held. */
+  /** The position of the traces among the rows held. */
   function drawPast(): void {
     const { ring } = feed;
     if (!ring.taken) return;
@@ -231,7 +231,7 @@ export const page: Page = (main, { notices, query }) => {
   const watch = window.setInterval(() => {
     freshness();
     alarms.silent(feed.ring.taken > 0 && main.classList.contains("stale") && traces.held === null && feed.state !== "ended");
-  }, 1000 * LOOK);
+  }, 1000 * CHECK);
   const forgets = [
     notices.on((notice) => notice.kind === "folder" && void reload(false)),
     onUnits(() => {

@@ -15,7 +15,7 @@ interface Bounds {
   getNorth(): number;
 }
 
-/** Ask for the edges of a picture without coordinates; null where the user gives up. */
+/** Ask for the edges of a picture without coordinates; null where the user cancels. */
 export function corners(name: string, bounds: Bounds, before: Corners | null = null): Promise<Corners | null> {
   return new Promise((resolve) => {
     const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", step: "any", id: `edge-${label}`, value: value.toFixed(6), required: true });
@@ -64,7 +64,7 @@ function kept(): Kept {
 
 const keep = (change: Partial<Kept>): void => localStorage.setItem(KEY, JSON.stringify({ ...kept(), ...change }));
 
-/** The basemap shown last in this browser, and where pictures that do not say it themselves were laid. */
+/** The basemap shown last in this browser, and the edges of pictures without coordinates. */
 export const keptBasemap = (): string => kept().picture;
 export const keepBasemap = (picture: string): void => keep({ picture });
 export const keptCorners = (picture: string): Corners | null => kept().placed[picture] ?? null;

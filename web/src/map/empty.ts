@@ -1,4 +1,4 @@
-/** What stands in place of a map that cannot be drawn: why, and what to do. */
+/** The text in place of a map that cannot be drawn: why, and what to do. */
 
 import { h } from "../ui/dom";
 

@@ -1,4 +1,4 @@
-/** The map as a sheet, drawn anew: the part that is shown, with title, legend, degrees at its edges and a scale in metres. */
+/** The map as a sheet, redrawn: the part that is shown, with title, legend, degrees at its edges and a scale in metres. */
 
 import type { Map as Maplibre } from "maplibre-gl";
 import { DRY, type Box, type Ink } from "../ui/ink";

@@ -92,7 +92,7 @@ function strip(width: number, ink: (share: number) => [string, number]): HTMLEle
   return bar;
 }
 
-/** Draw the legend in lines no wider than `width`; gives the height that it took. */
+/** Draw the legend in lines no wider than `width`; returns its height. */
 export function inkLegend(ink: Ink, legend: Legend, x: number, y: number, width: number): number {
   const heading = "words" in legend ? legend.title : `${legend.title} [${legend.unit.name}]`;
   ink.text(heading, x, y, color("ink"), "start", { bold: true });

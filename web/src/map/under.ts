@@ -15,12 +15,12 @@ maplibre.setWorkerUrl(workerUrl);
 export class UnderMap {
   readonly box = h("div", { class: "map", id: "map" });
   readonly map: maplibre.Map;
-  /** When the map takes layers. */
+  /** When the map accepts layers. */
   readonly ready: Promise<void>;
   loaded = false;
   /** Which picture lies below. */
   readonly choice = h("select", { "aria-label": "Basemap" });
-  /** Gives a picture that does not know its place other edges. */
+  /** Changes the edges of a picture without coordinates. */
   readonly edges = h("button", { type: "button", id: "map-edges", hidden: true, click: () => void this.replaceEdges(), title: "Change the edges of the picture" }, "Edges");
   private forget: () => void;
 
@@ -68,7 +68,7 @@ export class UnderMap {
     this.map.remove();
   }
 
-  /** Lay a picture down; `ask`: for its edges, where neither it nor this browser knows them. */
+  /** Place a picture; `ask`: for its edges, where neither it nor this browser has them. */
   private async lay(picture: string, ask: boolean): Promise<void> {
     await this.ready;
     const { map } = this;

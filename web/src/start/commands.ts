@@ -32,10 +32,10 @@ export const ACTIONS: Record<string, [string, string][]> = {
   estimates: [["soils", "Learn soils"], ["ground", "Ground"], ["map", "Map"], ["report", "Report"]],
 };
 
-/** What the server takes in place of what was typed, where that is not the same. */
+/** The value for the server in place of the typed one, where they differ. */
 const SENT: Partial<Record<Ask, (text: string) => unknown>> = { slip: (text) => Number(text) / 100, cell: Number };
 
-/** Ask what a command over `files` needs, and queue it; `queued` is called with its job. */
+/** Ask the user for what a command over `files` needs, and queue it; `queued` is called with its job. */
 export function ask(dialog: HTMLDialogElement, name: string, files: string[], items: Item[], queued: (job: Job) => void = () => {}): void {
   const command = COMMANDS[name] as Command;
   const fields = new Map<Ask, HTMLInputElement | HTMLSelectElement>();

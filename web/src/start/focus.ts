@@ -1,4 +1,4 @@
-/** Focus that never falls to the body when a part of the page is drawn anew. */
+/** Focus that never falls to the body when a part of the page is redrawn. */
 
 import { fill } from "../ui/dom";
 

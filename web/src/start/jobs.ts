@@ -18,12 +18,12 @@ export function freeName(items: Item[], stem: string, ending: string): string {
   }
 }
 
-/** A log's name without what tells its format. */
+/** A log's name without the suffix of its format. */
 export function stemOf(path: string): string {
   return path.replace(/(\.\w{1,8}){1,2}$/, "");
 }
 
-/** Where a file of the folder is looked at; null where it is only kept. */
+/** The page that shows a file of the folder; null where there is none. */
 export function viewOf(kind: string, path: string): string | null {
   const query = `path=${encodeURIComponent(path)}`;
   if (kind === "estimates" || kind === "estimate") return `#/drive?${query}`;

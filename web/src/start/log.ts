@@ -82,7 +82,7 @@ export class LogPage {
     await this.inspect();
   }
 
-  /** Of several vehicles none is taken for the log's: with the wrong one every number would be wrong, and nothing would say so. */
+  /** Of several vehicles none is chosen by default: with the wrong one every number would be wrong, without a sign. */
   private onlyVehicle(): string {
     const vehicles = this.of("vehicle");
     return vehicles.length === 1 ? (vehicles[0] as string) : "";

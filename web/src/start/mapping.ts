@@ -62,7 +62,7 @@ export class Mapping {
   private chosen = new Map<string, Choice>();
   private rows = new Map<string, HTMLElement>();
   private wheels: string[] = [];
-  private own = ""; // the profile written by this page, which it may write anew
+  private own = ""; // the profile written by this page, which it may overwrite
   readonly names = new WheelNames(() => this.nameRows());
 
   constructor(
@@ -70,7 +70,7 @@ export class Mapping {
     private saved: (profile: string) => void,
   ) {}
 
-  /** Look into the log; `output` is the profile to write. */
+  /** Preview the log; `output` is the profile to write. */
   async open(output: string): Promise<Look | undefined> {
     fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
     try {
@@ -90,7 +90,7 @@ export class Mapping {
     return this.look;
   }
 
-  /** Wheels and axles of the log that the vehicle does not know. */
+  /** Wheels and axles of the log that the vehicle does not have. */
   get strangers(): string[] {
     return this.names.strangers((channel) => this.chosen.has(channel));
   }
@@ -106,7 +106,7 @@ export class Mapping {
     return channel.wheel ? `${this.names.nameOf(channel.wheel)}: ${channel.title}` : channel.title;
   }
 
-  /** What the chosen channels measure, as the vehicle maker asks it. */
+  /** What the chosen channels measure, in the vehicle maker's terms. */
   get signals(): string {
     const names = [...this.chosen.keys()];
     if (names.some((name) => name.startsWith(SIGNALS.torque))) return "torque";

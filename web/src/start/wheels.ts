@@ -24,7 +24,7 @@ export class WheelNames {
   /** `changed`: another name was given. */
   constructor(private changed: () => void) {}
 
-  /** The channels of the log that may be named anew. */
+  /** The channels of the log that may be renamed. */
   of(channels: Channel[]): void {
     this.channels = channels.filter(({ wheel }) => wheel);
     this.draw();
@@ -46,7 +46,7 @@ export class WheelNames {
     return wheel ? name.slice(0, -wheel.length) + this.nameOf(wheel) : name;
   }
 
-  /** Wheels and axles that have `used` channels and that the vehicle does not know. */
+  /** Wheels and axles that have `used` channels and that the vehicle does not have. */
   strangers(used: (channel: string) => boolean): string[] {
     const names = this.channels.filter(({ name }) => used(name)).map(({ name, wheel }) => [wheel, this.known(name)] as const);
     return [...new Set(names.filter(([wheel, known]) => known.length && !known.includes(this.nameOf(wheel))).map(([wheel]) => wheel))];
@@ -65,7 +65,7 @@ export class WheelNames {
     return null;
   }
 
-  /** Put the cursor where the first name is to be given that the vehicle does not know. */
+  /** Put the cursor at the first name that the vehicle does not have. */
   focus(wheel: string): void {
     for (const one of this.element.querySelectorAll("details")) one.open = true;
     document.getElementById(idOf(wheel))?.focus();

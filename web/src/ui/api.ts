@@ -61,7 +61,7 @@ export async function send<T>(method: string, path: string, body: unknown, query
   return (answer.status === 204 ? undefined : await answer.json()) as T;
 }
 
-/** Upload with progress; `fetch` cannot tell how much has gone. */
+/** Upload with progress; `fetch` does not report how much was sent. */
 export function upload(path: string, content: Blob, replace: boolean, progress: (share: number) => void): Promise<{ path: string; kind: string }> {
   return new Promise((resolve, reject) => {
     const call = new XMLHttpRequest();
@@ -94,7 +94,7 @@ export const ME = crypto.getRandomValues(new Uint32Array(2)).join("-");
 
 export type Notice = { kind: "folder" } | { kind: "job"; job: Job } | { kind: "picture"; path: string; by: string } | { kind: "connection"; up: boolean };
 
-/** Hear the server's notices; joins again with growing pauses when the connection drops. */
+/** Listen to the server's notices; reconnects with growing pauses when the connection drops. */
 export class Notices {
   private listeners = new Set<(notice: Notice) => void>();
   private pause = 500;

@@ -21,7 +21,7 @@ export function brush(path: string, range: [number, number]): void {
   channel.postMessage(now);
 }
 
-/** Told of what other tabs brush, until the returned function is called. */
+/** Calls back with what other tabs brush, until the returned function is called. */
 export function onBrush(listener: (brush: Brush) => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);
@@ -43,7 +43,7 @@ export function point(path: string, time: number | null): void {
   cursor.postMessage({ path, time } satisfies Pointed);
 }
 
-/** Told of the cursor in other tabs, until the returned function is called. */
+/** Calls back with the cursor of other tabs, until the returned function is called. */
 export function onPoint(follower: (path: string, time: number | null) => void): () => void {
   followers.add(follower);
   return () => followers.delete(follower);

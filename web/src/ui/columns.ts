@@ -7,7 +7,7 @@ export interface Columns {
   count: number;
   cut: boolean;
   data: Float64Array[];
-  /** How many rows there are, where the server says it. */
+  /** The number of rows, where the server reports it. */
   of?: number;
 }
 

@@ -1,4 +1,4 @@
-/** The keyboard's place: where the focused control is drawn anew, hidden or disabled, focus goes to its successor, never to the body. */
+/** The keyboard's place: where the focused control is redrawn, hidden or disabled, focus goes to its successor, never to the body. */
 
 const FOCUSABLE = "a[href], button, input, select, summary, textarea, [tabindex='0']";
 

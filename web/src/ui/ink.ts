@@ -20,7 +20,7 @@ export interface Ink {
   picture(image: HTMLImageElement, map: [a: number, b: number, c: number, d: number, e: number, f: number]): void;
 }
 
-/** An ink that leaves none: to ask how high something is before there is a sheet. */
+/** An ink that draws nothing: to measure heights before there is a sheet. */
 export const DRY: Ink = { line: () => undefined, dots: () => undefined, area: () => undefined, text: () => undefined, clipped: (_, work) => work(), picture: () => undefined };
 
 export interface Box {

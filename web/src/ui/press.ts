@@ -1,4 +1,4 @@
-/** Redrawing that takes no click away: a click counts only where what was pressed is still there when it is released. */
+/** Redrawing without losing clicks: a click counts only where the pressed element is still there when it is released. */
 
 let pressed: Node | null = null;
 const waiting = new Map<HTMLElement, () => void>();

@@ -1,4 +1,4 @@
-/** Which run a page opens, and what it says where that run is not to be had. */
+/** The run that a page opens, and the message where that run is not available. */
 
 import type { Item } from "./api";
 import { h } from "./dom";
@@ -8,7 +8,7 @@ export function runsOf(items: Item[]): Map<string, string> {
   return new Map(items.filter((item) => item.kind === "estimates").map((item) => [item.path, `${item.size} ${item.modified}`]));
 }
 
-/** The options of a run's choice; one that is asked for and not there stands first, so that the choice never names another run. */
+/** The options of a run's choice; one that is requested and missing comes first, so that the choice never names another run. */
 export function options(runs: Map<string, string>, chosen: string): HTMLElement[] {
   const names = [...runs.keys()];
   const missing = chosen && !runs.has(chosen) ? [h("option", { value: chosen, selected: true }, `${chosen} (not available)`)] : [];

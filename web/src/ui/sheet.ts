@@ -1,4 +1,4 @@
-/** What is shown, to take away: a drawing as PNG or SVG, a table as CSV. */
+/** Saving what is shown: a drawing as PNG or SVG, a table as CSV. */
 
 import { h, save } from "./dom";
 import { CanvasInk, FONT, SvgInk, type Ink } from "./ink";
@@ -73,7 +73,7 @@ export function widthOf(text: string, bold = false): number {
 }
 let measure: CanvasRenderingContext2D | null = null;
 
-/** Entries of a legend, a sample before each, in lines no wider than `width`; gives the height that they took. */
+/** Entries of a legend, a sample before each, in lines no wider than `width`; returns their height. */
 export function legend(ink: Ink, entries: { text: string; sample: (ink: Ink, x: number, y: number) => void }[], x: number, y: number, width: number): number {
   let [at, line] = [x, y];
   for (const { text, sample } of entries) {

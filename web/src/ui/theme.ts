@@ -1,4 +1,4 @@
-/** Light and dark: the system's choice until the user makes one. Canvas drawings ask here for their colours. */
+/** Light and dark: the system's choice until the user makes one. Canvas drawings take their colours from here. */
 
 const KEY = "terragrip-theme";
 const listeners = new Set<() => void>();

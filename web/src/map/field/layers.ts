@@ -1,4 +1,4 @@
-/** The layers of a map: what of a quantity's cells is drawn, in which colours, and the legend that says so. */
+/** The layers of a map: what of a quantity's cells is drawn, in which colours, and the legend. */
 
 import { soilColor } from "../../drive/run";
 import { color, theme } from "../../ui/theme";
@@ -30,7 +30,7 @@ export function layersOf(field: Field, mapped: Mapped | undefined): { value: Lay
   ];
 }
 
-/** A layer as it is drawn: what each cell looks like, and what the legend says. */
+/** A layer as it is drawn: the colour of each cell, and the legend. */
 export interface Painted {
   legend: Legend;
   /** The colour of a cell, and its ink from 0 to 1. */
@@ -39,7 +39,7 @@ export interface Painted {
 
 const NEITHER = 0.3; // ink of a change that is not significant
 
-/** Whether a cell is of the area that is looked at. */
+/** Whether a cell is in the chosen area. */
 export const inArea = (cells: Cells, area: AreaName) => (i: number): boolean => area === "all" || (cells.headland[i] as number) > 0.5 === (area === "headland");
 
 export function painted(layer: LayerName, cells: Cells, field: Field, mapped: Mapped, area: AreaName, fade: boolean): Painted {
@@ -89,7 +89,7 @@ function counted(values: Float64Array): [number, number] {
   return high > low ? [low, high] : [Number.isFinite(low) ? low : 0, (Number.isFinite(low) ? low : 0) + 1];
 }
 
-/** Less is orange, more is blue, which every eye tells apart; none is the page's own grey. */
+/** Less is orange, more is blue, which colour-blind readers can distinguish; none is the page's own grey. */
 function change(cells: Cells, mapped: Mapped, title: string, unit: Unit, inside: (i: number) => boolean, of: (values: ArrayLike<number>) => Float64Array): Painted {
   const { difference = new Float32Array(cells.count).fill(NaN), significant } = cells;
   const [low, high] = spread(of(difference));

@@ -7,7 +7,7 @@ import { rgbOf } from "../shade";
 import type { Cells, Field, Place, Tile } from "./data";
 import type { Painted } from "./layers";
 
-const RIM = 1.5; // pixels around what was driven, so that dark cells stand out on dark paper
+const RIM = 1.5; // pixels around the driven cells, so that dark ones are visible on a dark page
 const AROUND = [[1, 0], [-1, 0], [0, 1], [0, -1], [0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7]] as const;
 
 /** From cells of a tile (from its north-west corner) to pixels: x' = a x + c y + e, y' = b x + d y + f. */
