@@ -83,7 +83,7 @@ def test_many_drives_without_a_library(files, tmp_path, capsys):
     data = json.loads(out.read_text())
     assert {s["soil"] for s in data["sections"]} == {"unknown"}
     assert [c["run"] for c in data["changes"]] == ["run1", "run2"]
-    assert all(c["told"] > c["time"] for c in data["changes"])
+    assert all(c["reported"] > c["time"] for c in data["changes"])
     assert sorted(p.name for p in folder.iterdir()) == ["run1.parquet", "run2.parquet"]
     capsys.readouterr()
     assert main(["ground", str(folder / "run1.parquet"), "-q", "-o", str(out)]) == 0

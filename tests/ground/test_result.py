@@ -12,6 +12,7 @@ import pytest
 from ground_drives import FINE, GRASS, drive
 from terragrip.errors import InputError
 from terragrip.ground.analysis import Settings, analyse
+from terragrip.ground.changes import Change
 from terragrip.ground.result import Timeline, read, write
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -110,3 +111,8 @@ def test_confusion_counts_and_merging_adds_up():
     np.testing.assert_allclose(both.probabilities[:, 0], one.probabilities[:, :2].sum(axis=1))
     assert confusion([both]).right == 1.0
     assert np.isnan(confusion([]).right)
+
+
+def test_a_change_of_an_older_file_keeps_when_it_was_reported():
+    old = {"time": 4.0, "std": 0.5, "probability": 0.9, "told": 6.5}
+    assert Change.from_dict(old).to_dict() == {"time": 4.0, "std": 0.5, "probability": 0.9, "reported": 6.5}

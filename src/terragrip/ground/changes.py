@@ -50,12 +50,12 @@ class Change:
         """As ground.json holds it."""
         out: dict[str, Any] = {"time": self.time, "std": self.std, "probability": self.probability}
         if self.reported is not None:
-            out["told"] = self.reported
+            out["reported"] = self.reported
         return {**out, "shift": dict(self.shift)} if self.shift else out
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Change:
-        """Of ground.json; raises TypeError where it is none."""
+        """Of ground.json (older ones have ``told`` for ``reported``); raises TypeError where it is none."""
         return cls(**{"reported" if name == "told" else name: value for name, value in data.items()})
 
 
