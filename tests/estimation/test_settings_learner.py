@@ -29,9 +29,9 @@ def learned_by(learner: SettingsLearner, log: Recording, begin: int = 0) -> dict
     columns = {name: values.tolist() for name, values in log.channels.items()}
     out = {}
     for row in range(begin, len(log)):
-        told = learner.add(float(log.time[row]), {name: values[row] for name, values in columns.items()})
-        if told is not None:
-            out[row] = told
+        learned = learner.add(float(log.time[row]), {name: values[row] for name, values in columns.items()})
+        if learned is not None:
+            out[row] = learned
     return out
 
 
@@ -41,14 +41,14 @@ def test_chunks_of_ten_seconds_are_learned_from_as_a_log_is(log: Recording) -> N
     chunk = int(SECONDS * 100)
     # after 1, 2, 3, 4 and 5 chunks; with five, every second one is kept: 0, 2 and 4
     assert list(out) == [chunk * k for k in (1, 2, 3, 4, 5)]
-    for row, told in out.items():
+    for row, learned in out.items():
         kept = np.arange(row) if row < 5 * chunk else np.flatnonzero(np.arange(row) // chunk % 2 == 0)
         part = log.select(kept)
         noise, held = settings_in(Recording(part.time, part.channels), vehicle)
-        assert told.noise == noise
-        assert told.held == held
-        assert "ground_speed" in told.held
-        assert told.seconds == pytest.approx(len(np.unique(kept // chunk)) * (SECONDS - 0.01))
+        assert learned.noise == noise
+        assert learned.held == held
+        assert "ground_speed" in learned.held
+        assert learned.seconds == pytest.approx(len(np.unique(kept // chunk)) * (SECONDS - 0.01))
 
 
 def test_a_chunk_of_many_rows_ends_early(log: Recording) -> None:
@@ -62,10 +62,10 @@ def test_what_is_given_is_not_learned_and_a_channel_that_never_came_is_absent(lo
     learner = SettingsLearner(
         robot(sensors=UNKNOWN), (*log.channels, "roll"), {"wheel_speed": 0.5}, {"ground_speed": 0.4}
     )
-    told = learned_by(learner, log.select(slice(0, 1100)))[1000]
-    assert told.held["ground_speed"] == 0.4
-    assert not any(name.startswith("wheel_speed") and sd != 0.5 for name, sd in told.noise.items())
-    assert "roll" not in told.noise
+    learned = learned_by(learner, log.select(slice(0, 1100)))[1000]
+    assert learned.held["ground_speed"] == 0.4
+    assert not any(name.startswith("wheel_speed") and sd != 0.5 for name, sd in learned.noise.items())
+    assert "roll" not in learned.noise
 
 
 def test_only_noise_that_differs_by_a_tenth_is_worth_a_word() -> None:

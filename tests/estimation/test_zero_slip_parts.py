@@ -38,7 +38,7 @@ def test_the_error_of_a_median_counts_half_the_windows_and_the_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "told", "std", "doubt"),
+    ("value", "expected", "std", "doubt"),
     [
         (0.98, 0.98, np.sqrt(0.003**2 / 30 + 0.002**2 + 0.012**2 + 0.03**2), "all windows slip alike, so"),
         (0.955, 0.955, np.sqrt(0.003**2 / 30 + 0.002**2 + 0.012**2 + 0.03**2), "all windows slip alike, so"),
@@ -49,10 +49,10 @@ def test_the_error_of_a_median_counts_half_the_windows_and_the_place() -> None:
     ],
 )
 def test_where_all_windows_slip_alike_a_radius_is_in_doubt(
-    value: float, told: float, std: float, doubt: str
+    value: float, expected: float, std: float, doubt: str
 ) -> None:
     zero = _judged(around(value, 60), NONE)
-    assert zero.ratio == pytest.approx(told, abs=1e-4)
+    assert zero.ratio == pytest.approx(expected, abs=1e-4)
     assert zero.std == pytest.approx(std, rel=0.01)
     assert zero.windows >= 59
     assert zero.doubt.startswith(doubt)

@@ -54,7 +54,7 @@ def drive(rate: float = 20.0) -> Columns:
     return result
 
 
-def told(columns: Columns, vehicle: Vehicle | None = None) -> list[str]:
+def notes_on(columns: Columns, vehicle: Vehicle | None = None) -> list[str]:
     return unit_warnings(Recording.from_frame(columns), vehicle or machine())
 
 
@@ -66,7 +66,7 @@ def spoilt(name: str, code: float, share: float = 0.01) -> Columns:
 
 @pytest.mark.parametrize("rate", [1.0, 20.0, 100.0])
 def test_a_right_log_says_nothing(rate: float) -> None:
-    assert told(drive(rate)) == []
+    assert notes_on(drive(rate)) == []
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_right_log_says_nothing(rate: float) -> None:
 )
 def test_a_code_for_no_value_is_named_alone(name: str, code: float) -> None:
     """Scale, sign and slip are judged without it."""
-    (note,) = told(spoilt(name, code))
+    (note,) = notes_on(spoilt(name, code))
     assert note.startswith(f"{name} is {code:.6g} in ")
     assert "'invalid: [...]' in the profile" in note
 
@@ -90,7 +90,7 @@ def test_a_code_for_no_value_is_named_alone(name: str, code: float) -> None:
     ("name", "value"), [("drive_torque_rr", 300.0), ("drawbar_force", 6000.0), ("ground_speed", 12.0)]
 )
 def test_what_a_machine_can_have_is_no_code(name: str, value: float) -> None:
-    assert not any("a code for" in note for note in told(spoilt(name, value)))
+    assert not any("a code for" in note for note in notes_on(spoilt(name, value)))
 
 
 def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
@@ -98,9 +98,9 @@ def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
     rows = np.arange(0, len(columns["time"]), 100)
     spikes = columns["ground_speed"].copy()
     spikes[rows] = 5000.0 + rows
-    assert not any("a code for" in note for note in told(columns | {"ground_speed": spikes}))
+    assert not any("a code for" in note for note in notes_on(columns | {"ground_speed": spikes}))
     assert not any(
-        "a code for" in note for note in told(columns | {"ground_speed": 1e3 * columns["ground_speed"]})
+        "a code for" in note for note in notes_on(columns | {"ground_speed": 1e3 * columns["ground_speed"]})
     )
 
 
@@ -110,7 +110,7 @@ def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, pla
     columns = drive(rate) | {"time": drive(rate)["time"] / factor}
     if not placed:
         columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
-    (note,) = told(columns)
+    (note,) = notes_on(columns)
     assert re.search(
         r"change their speed by .* more than any ground allows: time may not be in seconds", note
     )
@@ -123,7 +123,7 @@ def test_a_drive_of_two_starts_tells_of_its_clock() -> None:
     speed = np.interp(columns["time"], [0, 10, 12, 150, 152, 300], [0, 0, 1.6, 1.6, 1.1, 1.1])
     columns = {"time": columns["time"] / 60, "ground_speed": speed + 0.01 * draws.standard_normal(len(speed))}
     columns |= {f"wheel_speed_{w}": speed / RADIUS + 0.02 * draws.standard_normal(len(speed)) for w in WHEELS}
-    assert any("time may not be in seconds" in note for note in told(columns))
+    assert any("time may not be in seconds" in note for note in notes_on(columns))
 
 
 def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> None:
@@ -134,7 +134,7 @@ def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> 
     columns = {"time": time / 60, "ground_speed": speed + 0.01 * draws.standard_normal(len(time))}
     columns |= {f"wheel_speed_{w}": speed / RADIUS + 0.01 * draws.standard_normal(len(time)) for w in WHEELS}
     columns |= {"latitude": 51 + np.cumsum(speed) * 0.1 / 111_250, "longitude": np.full(len(time), 13.0)}
-    (note,) = told(columns)
+    (note,) = notes_on(columns)
     assert re.match(
         r"The positions lie 1633 m apart, where ground and wheels drove 30\.07 m: time may not be in seconds",
         note,
@@ -146,17 +146,18 @@ def test_a_machine_that_was_carried_away_while_the_logger_was_off_is_no_clock_in
     columns = drive()
     later = columns["time"] >= 150
     away = columns | {"time": columns["time"] + 3600.0 * later, "latitude": columns["latitude"] + 0.2 * later}
-    assert told(away) == []
+    assert notes_on(away) == []
     blind = np.where((columns["time"] > 2) & (columns["time"] < 298), np.nan, columns["ground_speed"])
-    assert not any("time may not be" in note for note in told(columns | {"ground_speed": blind}))
+    assert not any("time may not be" in note for note in notes_on(columns | {"ground_speed": blind}))
 
 
 def test_rows_counted_for_seconds_are_told_where_wheels_go_with_the_ground_speed() -> None:
     columns = drive()
-    notes = told(columns | {"time": np.arange(len(columns["time"]), dtype=float)})
+    notes = notes_on(columns | {"time": np.arange(len(columns["time"]), dtype=float)})
     assert any(note.endswith("The wheel speeds agree with it: time may not be in seconds.") for note in notes)
     assert not any(
-        "time may not be" in note for note in told(columns | {"ground_speed": 3.6 * columns["ground_speed"]})
+        "time may not be" in note
+        for note in notes_on(columns | {"ground_speed": 3.6 * columns["ground_speed"]})
     )
 
 
@@ -178,7 +179,8 @@ def test_a_ground_speed_that_is_the_wheels_own_is_named() -> None:
     columns = drive()
     own = RADIUS * np.mean([columns[f"wheel_speed_{w}"] for w in WHEELS], axis=0)
     assert any(
-        "ground_speed is made of the wheels' speeds" in note for note in told(columns | {"ground_speed": own})
+        "ground_speed is made of the wheels' speeds" in note
+        for note in notes_on(columns | {"ground_speed": own})
     )
 
 
@@ -186,13 +188,13 @@ def test_a_free_wheel_that_was_made_of_the_ground_speed_is_none() -> None:
     """docs/vehicle.md asks for it."""
     columns = {n: v for n, v in drive().items() if n not in ("drive_torque_rl", "drive_torque_rr")}
     columns |= {f"wheel_speed_{w}": columns["ground_speed"] / RADIUS for w in ("rl", "rr")}
-    assert not any("odometry" in note for note in told(columns, machine(driven=False)))
+    assert not any("odometry" in note for note in notes_on(columns, machine(driven=False)))
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(0.1, "daN"), (1 / G, "daN"), (1 / 4.448, "lbf")])
 def test_a_drawbar_force_in_another_unit_is_named(factor: float, unit: str) -> None:
     columns = drive()
-    (note,) = told(columns | {"drawbar_force": factor * columns["drawbar_force"]})
+    (note,) = notes_on(columns | {"drawbar_force": factor * columns["drawbar_force"]})
     assert f"it may be in {unit}: write 'unit: {unit}' for it in the profile" in note
 
 

@@ -51,7 +51,7 @@ def drive(seed: int = 0, *, hills: float = 0.05) -> Columns:
     return result
 
 
-def told(columns: Columns, vehicle: Vehicle | None = None) -> str:
+def notes_on(columns: Columns, vehicle: Vehicle | None = None) -> str:
     return " ".join(unit_warnings(Recording.from_frame(columns), vehicle or machine()))
 
 
@@ -81,7 +81,7 @@ SENSORS = {
 @pytest.mark.parametrize("missing", SENSORS)
 def test_a_right_log_is_left_alone(missing: str, hills: float) -> None:
     for seed in range(3):
-        assert told(without(drive(seed, hills=hills), *SENSORS[missing])) == ""
+        assert notes_on(without(drive(seed, hills=hills), *SENSORS[missing])) == ""
 
 
 def test_real_doubts_of_mass_and_torque_are_left_alone() -> None:
@@ -91,7 +91,7 @@ def test_real_doubts_of_mass_and_torque_are_left_alone() -> None:
         mass=1040,
         axles={"front": {"mass": 455, "wheels": ["fl", "fr"]}, "rear": {"mass": 585, "wheels": ["rl", "rr"]}},
     )
-    assert told(columns, heavy) == ""
+    assert notes_on(columns, heavy) == ""
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_real_doubts_of_mass_and_torque_are_left_alone() -> None:
 )
 def test_a_mistake_is_named(factors: dict[str, float], expected: str) -> None:
     for seed in range(3):
-        assert expected in told(scaled(drive(seed), factors))
+        assert expected in notes_on(scaled(drive(seed), factors))
 
 
 @pytest.mark.parametrize(
@@ -128,13 +128,13 @@ def test_a_mistake_is_named(factors: dict[str, float], expected: str) -> None:
     ],
 )
 def test_a_slope_that_nothing_shows_hides_no_mistake(factors: dict[str, float], expected: str) -> None:
-    assert expected in told(scaled(without(drive(), "pitch", "roll"), factors))
+    assert expected in notes_on(scaled(without(drive(), "pitch", "roll"), factors))
 
 
 def test_without_an_accelerometer_the_ground_speed_tells() -> None:
     columns = without(drive(hills=0.0), "acceleration_x", "acceleration_y", "acceleration_z", "pitch", "roll")
-    assert "torques over the wheel radius are 0.03" in told(scaled(columns, {"drive_torque": 1 / 30}))
-    assert "drive torques fall" in told(scaled(columns, {"drive_torque": -1.0}))
+    assert "torques over the wheel radius are 0.03" in notes_on(scaled(columns, {"drive_torque": 1 / 30}))
+    assert "drive torques fall" in notes_on(scaled(columns, {"drive_torque": -1.0}))
 
 
 @pytest.mark.parametrize(
@@ -145,22 +145,22 @@ def test_without_an_accelerometer_the_ground_speed_tells() -> None:
     ],
 )
 def test_exchanged_axes_are_named(axes: tuple[str, str], expected: str) -> None:
-    assert expected in told(exchanged(drive(), *axes))
+    assert expected in notes_on(exchanged(drive(), *axes))
 
 
 def test_a_diameter_for_a_radius_is_named() -> None:
-    notes = told(drive(), machine(wheel={"radius": 2 * RADIUS, "inertia": 4}))
+    notes = notes_on(drive(), machine(wheel={"radius": 2 * RADIUS, "inertia": 4}))
     assert "not the diameter" in notes
     assert "slip by 0.5" in notes
 
 
 def test_a_mass_in_the_wrong_unit_is_named() -> None:
     axles = {"front": {"mass": 35, "wheels": ["fl", "fr"]}, "rear": {"mass": 45, "wheels": ["rl", "rr"]}}
-    assert "the force that moves 80 kg" in told(drive(), machine(mass=80, axles=axles))
+    assert "the force that moves 80 kg" in notes_on(drive(), machine(mass=80, axles=axles))
 
 
 def test_a_short_log_says_nothing() -> None:
-    assert told({n: v[:200] for n, v in scaled(drive(), {"drive_torque": -1.0}).items()}) == ""
+    assert notes_on({n: v[:200] for n, v in scaled(drive(), {"drive_torque": -1.0}).items()}) == ""
 
 
 def pulling(seed: int = 0) -> Columns:
@@ -186,7 +186,7 @@ def pulling(seed: int = 0) -> Columns:
 )
 def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str) -> None:
     for seed in range(3):
-        notes = told(scaled(pulling(seed), factors))
+        notes = notes_on(scaled(pulling(seed), factors))
         assert expected in notes
         assert bool(notes) == bool(expected)
 
@@ -194,7 +194,7 @@ def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str
 @pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])
 def test_an_accelerometer_that_is_tilted_is_named(bias: float, expected: str) -> None:
     columns = drive()
-    notes = told({**columns, "acceleration_x": columns["acceleration_x"] + bias})
+    notes = notes_on({**columns, "acceleration_x": columns["acceleration_x"] + bias})
     assert expected in notes
     assert bool(notes) == bool(expected)
 
@@ -205,8 +205,8 @@ def test_radii_that_are_exchanged_are_named_and_slip_is_not() -> None:
         "front": {"mass": 350, "wheels": ["fl", "fr"], "wheel": {"radius": 0.45, "inertia": 4}},
         "rear": {"mass": 450, "wheels": ["rl", "rr"]},
     }
-    assert "The rims of the axle front go 1.29 times" in told(drive(), machine(axles=axles))
-    assert told(scaled(drive(), {"wheel_speed_f": 1.1})) == ""
+    assert "The rims of the axle front go 1.29 times" in notes_on(drive(), machine(axles=axles))
+    assert notes_on(scaled(drive(), {"wheel_speed_f": 1.1})) == ""
 
 
 @pytest.mark.parametrize(("run", "seed"), [("hard-09", 0), ("fine-09", 0), ("fine-08", 1)])
@@ -219,5 +219,7 @@ def test_axles_that_share_a_pull_and_wheels_that_dig_in_are_no_wrong_sign(run: s
 
 def test_without_an_accelerometer_the_thrust_tells_the_pitchs_sign() -> None:
     columns = without(drive(), "acceleration_x", "acceleration_y", "acceleration_z")
-    assert told(columns) == ""
-    assert told(scaled(columns, {"pitch": -1.0})).startswith("pitch falls where the wheels are driven harder")
+    assert notes_on(columns) == ""
+    assert notes_on(scaled(columns, {"pitch": -1.0})).startswith(
+        "pitch falls where the wheels are driven harder"
+    )

@@ -17,7 +17,7 @@ def machine(number: int, chassis: families.Chassis = "sprung") -> SimulationResu
     return families.draw(kind, seed, rate=20.0)
 
 
-def told(result: SimulationResult, factor: float) -> list[str]:
+def notes_on(result: SimulationResult, factor: float) -> list[str]:
     """The notes with the vehicle file's radii times a factor."""
     data = result.vehicle.to_dict()
     for part in (data, *data["axles"].values()):
@@ -32,8 +32,10 @@ def test_radii_that_are_too_small_by_8_percent_are_named(chassis: families.Chass
     named = 0
     for number in (0, 3, 5, 7, 10):
         result = machine(number, chassis)
-        assert told(result, 1.0) == []
-        named += any(note.startswith("While the wheels pull, straight ahead") for note in told(result, 0.92))
+        assert notes_on(result, 1.0) == []
+        named += any(
+            note.startswith("While the wheels pull, straight ahead") for note in notes_on(result, 0.92)
+        )
     assert named >= 3
 
 
@@ -51,7 +53,7 @@ def test_without_torques_nothing_says_that_the_wheels_pull() -> None:
     result = machine(0)
     speeds = {n: v for n, v in result.recording.channels.items() if "torque" not in n}
     bare = replace(result, recording=replace(result.recording, channels=speeds))
-    assert not any(note.startswith("While the wheels pull") for note in told(bare, 0.92))
+    assert not any(note.startswith("While the wheels pull") for note in notes_on(bare, 0.92))
 
 
 @pytest.mark.parametrize(("ratio", "said"), [(1.0, False), (8.0, False), (25.0, True)])

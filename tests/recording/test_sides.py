@@ -49,7 +49,7 @@ def skidding(seed: int = 0, *, steered: bool = False) -> Recording:
     return Recording.from_frame(columns)
 
 
-def told(log: Recording, **factors: float) -> list[str]:
+def notes_on(log: Recording, **factors: float) -> list[str]:
     """The notes on a log of which some channels are multiplied."""
     changed = {name: log.channels[name] * factor for name, factor in factors.items()}
     return unit_warnings(log.with_channels(**changed), vehicle())
@@ -62,8 +62,8 @@ def exchanged(log: Recording, *wheels: str) -> list[str]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_right_log_is_left_alone(seed: int) -> None:
-    assert told(skidding(seed)) == []
-    assert told(skidding(seed, steered=True)) == []
+    assert notes_on(skidding(seed)) == []
+    assert notes_on(skidding(seed, steered=True)) == []
 
 
 @pytest.mark.parametrize("axle", ["f", "r"])
@@ -86,7 +86,7 @@ def test_exchanged_torques_need_a_rate_of_turn() -> None:
 
 @pytest.mark.parametrize(("gain", "said"), [(0.9, False), (0.75, True), (1.35, True)])
 def test_a_torque_of_another_scale_is_named_straight_ahead(gain: float, said: bool) -> None:
-    notes = told(skidding(), drive_torque_rl=gain)
+    notes = notes_on(skidding(), drive_torque_rl=gain)
     assert bool(notes) is said
     if said:
         assert notes[0].startswith(
@@ -95,12 +95,12 @@ def test_a_torque_of_another_scale_is_named_straight_ahead(gain: float, said: bo
 
 
 def test_torques_uneven_on_both_axles_are_the_load() -> None:
-    assert told(skidding(), drive_torque_rl=0.75, drive_torque_fl=0.75) == []
+    assert notes_on(skidding(), drive_torque_rl=0.75, drive_torque_fl=0.75) == []
 
 
 @pytest.mark.parametrize(("scale", "said"), [(1.03, False), (1.1, True)])
 def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool) -> None:
-    notes = told(skidding(), wheel_speed_fl=scale)
+    notes = notes_on(skidding(), wheel_speed_fl=scale)
     assert bool(notes) is said
     if said:
         assert notes[0].startswith(
@@ -109,12 +109,14 @@ def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool
 
 
 def test_a_wheel_that_turns_against_all_others_is_named() -> None:
-    (note,) = [n for n in told(skidding(), wheel_speed_rr=-1.0) if "opposite to that of all others" in n]
+    (note,) = [n for n in notes_on(skidding(), wheel_speed_rr=-1.0) if "opposite to that of all others" in n]
     assert note.startswith("The wheel speed of rr is")
 
 
 def test_a_torque_that_falls_where_its_neighbour_rises_is_named() -> None:
-    assert any(n.startswith("drive_torque_rr falls where") for n in told(skidding(), drive_torque_rr=-1.0))
+    assert any(
+        n.startswith("drive_torque_rr falls where") for n in notes_on(skidding(), drive_torque_rr=-1.0)
+    )
 
 
 def little(gain: float = 1.0, *, offset: float = 0.0, gyroscope: bool = True) -> list[str]:
@@ -173,6 +175,6 @@ def test_steered_wheels_scrub_less(factor: float, said: bool) -> None:
 
 def test_an_uneven_torque_hides_no_wrong_unit_of_a_speed() -> None:
     """A ground speed in knots was left alone where two torques of an axle differed."""
-    notes = " ".join(told(skidding(), ground_speed=1 / 0.5144, drive_torque_fl=1.4))
+    notes = " ".join(notes_on(skidding(), ground_speed=1 / 0.5144, drive_torque_fl=1.4))
     assert "drive_torque_fl is 1.4" in notes
     assert "ground_speed may be in knots" in notes

@@ -45,15 +45,15 @@ def unsigned(columns: Columns) -> Columns:
     return {name: np.abs(v) if name.startswith("drive_torque") else v for name, v in columns.items()}
 
 
-def told(columns: Columns) -> list[str]:
+def notes_on(columns: Columns) -> list[str]:
     return sign_warnings(Recording.from_frame(columns), machine())
 
 
 @pytest.mark.parametrize("case", [{}, {"backward": True, "stop": 8.0}, {"downhill": 0.15, "stop": 8.0}])
 def test_torques_without_a_sign_are_named(case: dict[str, float]) -> None:
     """In stops, in reverse, downhill."""
-    assert told(drive(**case)) == []  # type: ignore[arg-type]
-    (note,) = told(unsigned(drive(**case)))  # type: ignore[arg-type]
+    assert notes_on(drive(**case)) == []  # type: ignore[arg-type]
+    (note,) = notes_on(unsigned(drive(**case)))  # type: ignore[arg-type]
     assert note.startswith(
         "drive_torque_fl, drive_torque_fr, drive_torque_rl, drive_torque_rr are never below 0"
     )
@@ -62,16 +62,16 @@ def test_torques_without_a_sign_are_named(case: dict[str, float]) -> None:
 
 
 def test_where_nothing_brakes_a_size_is_the_torque() -> None:
-    assert told(unsigned(drive(stop=8.0))) == []
+    assert notes_on(unsigned(drive(stop=8.0))) == []
 
 
 def test_brakes_that_the_torques_do_not_see_are_no_missing_sign() -> None:
     """A motor without current while a mechanical brake stops the vehicle."""
     columns = {n: np.maximum(v, 0.0) if n.startswith("drive_torque") else v for n, v in drive().items()}
-    assert told(columns) == []
+    assert notes_on(columns) == []
 
 
 def test_without_a_torque_of_each_driven_wheel_or_motion_nothing_is_told() -> None:
     columns = unsigned(drive())
-    assert told({n: v for n, v in columns.items() if n != "drive_torque_fl"}) == []
-    assert told({n: v[:100] for n, v in columns.items()}) == []
+    assert notes_on({n: v for n, v in columns.items() if n != "drive_torque_fl"}) == []
+    assert notes_on({n: v[:100] for n, v in columns.items()}) == []

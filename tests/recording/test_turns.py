@@ -23,7 +23,7 @@ def machine(number: int) -> SimulationResult:
     return families.draw(kind, seed, rate=20.0)
 
 
-def told(
+def notes_on(
     result: SimulationResult, pair: tuple[str, str] = ("", ""), *quantities: str, without: str = "-"
 ) -> list[str]:
     """The notes on a machine's log, two wheels exchanged in it, and without some channel."""
@@ -38,8 +38,8 @@ def told(
 @pytest.mark.parametrize("number", range(24))
 def test_a_right_log_is_left_alone(number: int) -> None:
     result = machine(number)
-    assert told(result) == []
-    assert told(result, without="angular_velocity") == []
+    assert notes_on(result) == []
+    assert notes_on(result, without="angular_velocity") == []
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def test_an_axle_that_slips_far_beyond_the_other_is_no_exchange_and_no_scale(
 def test_a_left_wheel_for_a_right_one_is_named_by_turns(
     pair: tuple[str, str], quantities: tuple[str, ...]
 ) -> None:
-    note = told(machine(TURNING), pair, *quantities)[0]
+    note = notes_on(machine(TURNING), pair, *quantities)[0]
     assert note.startswith(f"wheel_speed_{pair[0]} and wheel_speed_{pair[1]} may be exchanged: in turns")
 
 
 def test_without_a_gyroscope_both_pairs_that_would_do_are_named() -> None:
-    notes = told(machine(TURNING), ("1l", "1r"), "wheel_speed", without="angular_velocity")
+    notes = notes_on(machine(TURNING), ("1l", "1r"), "wheel_speed", without="angular_velocity")
     assert [n.split(" may be")[0] for n in notes] == [
         "wheel_speed_1l and wheel_speed_1r, or wheel_speed_2l and wheel_speed_2r"
     ]
@@ -76,7 +76,7 @@ def test_without_a_gyroscope_both_pairs_that_would_do_are_named() -> None:
 
 @pytest.mark.parametrize("pair", [("1l", "2l"), ("1l", "2r"), ("1r", "2l"), ("1r", "2r")])
 def test_torques_of_two_axles_are_named_straight_ahead(pair: tuple[str, str]) -> None:
-    notes = told(machine(WORKING), pair, "drive_torque")
+    notes = notes_on(machine(WORKING), pair, "drive_torque")
     assert [n.split(": ")[0] for n in notes] == [
         f"drive_torque_{pair[0]} and drive_torque_{pair[1]} may be exchanged"
     ]

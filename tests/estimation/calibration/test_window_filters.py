@@ -290,11 +290,11 @@ def test_one_stop_counts_where_it_lasts_and_stops_without_driving_between_are_on
     assert len(resting(two_logs, values, [Spell(0, 2), Spell(5, 8)], count, 1.0, MOST)) == 2
 
 
-@pytest.mark.parametrize(("known", "told"), [(1, False), (2, True)])
-def test_a_mean_over_spells_needs_two_windows(known: int, told: bool) -> None:
+@pytest.mark.parametrize(("known", "finite"), [(1, False), (2, True)])
+def test_a_mean_over_spells_needs_two_windows(known: int, finite: bool) -> None:
     values = np.where(np.arange(4) < known, 2.0, np.nan)
     mean, error = zeros.spell_mean(values, [Spell(0, 3)], np.full(4, 100.0), 0.5)
-    assert (np.isfinite(mean), np.isfinite(error)) == (told, told)
+    assert (np.isfinite(mean), np.isfinite(error)) == (finite, finite)
 
 
 def test_a_yaw_rate_rests_at_its_mean_over_all_samples_of_standstill(vehicle: Vehicle) -> None:
