@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Collection, Mapping, Sequence
+
+import yaml
 
 from terragrip.formats.recognition import Proposal
 from terragrip.recording import Recording
 from terragrip.recording.schema import has_torque, wheel_names_in
-
-_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*$")
-_LIKE_YAML = {"yes", "no", "on", "off", "true", "false", "null", "y", "n"}
 
 
 def missing_channels(proposals: Collection[str], has_time: bool, columns: Collection[str] = ()) -> list[str]:
@@ -118,17 +116,7 @@ def _order(channel: str) -> tuple[int, str]:
 
 
 def _flow(entry: Mapping[str, object]) -> str:
-    return "{" + ", ".join(f"{key}: {_scalar(value)}" for key, value in entry.items()) + "}"
-
-
-def _scalar(value: object) -> str:
-    if isinstance(value, Mapping):
-        return _flow(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(_scalar(item) for item in value) + "]"
-    text = str(value)
-    if not isinstance(value, str) or re.fullmatch(r"[\d.]+ s", text):
-        return text
-    known_unit = re.fullmatch(r"[A-Za-z]+([/ ][A-Za-z]+(\^\d)?)?", text) is not None
-    safe = (_PLAIN.match(text) or known_unit) and text.lower() not in _LIKE_YAML
-    return text if safe else json.dumps(text, ensure_ascii=False)
+    """An entry on one line of YAML."""
+    return yaml.safe_dump(
+        dict(entry), default_flow_style=True, sort_keys=False, allow_unicode=True, width=1 << 16
+    ).rstrip("\n")
