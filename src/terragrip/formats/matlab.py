@@ -58,7 +58,9 @@ def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> Sig
             read = worker.receive()["tree"]
         except InputError:
             return _finished(tree, path, wanted)  # the notes name what is left
-        known = {name: _merged(tree[name], _of_worker(part, worker)) for name, part in read.items()}
+        known = {
+            name: value for name, part in read.items() if (value := _of_worker(part, worker)) is not None
+        }
         return _finished({**tree, **known}, path, wanted)
 
 
@@ -89,17 +91,6 @@ def _of_worker(node: Any, worker: Worker) -> Any:
 def _asked(worker: Worker, number: int) -> npt.NDArray[Any]:
     worker.send(number)
     return worker.array()
-
-
-def _merged(own: Any, objects: Any) -> Any:
-    """What was read here, with what mat-io made of the objects in it."""
-    if isinstance(own, Opaque):
-        return own if objects is None else objects
-    if isinstance(own, Mapping) and isinstance(objects, Mapping):
-        return {key: _merged(part, objects.get(key)) for key, part in own.items()}
-    if isinstance(own, list) and isinstance(objects, list) and len(own) == len(objects):
-        return [_merged(part, other) for part, other in zip(own, objects, strict=True)]
-    return own
 
 
 def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
