@@ -18,22 +18,6 @@ _TOGETHER, _BYTES = 2000, 4 << 20  # messages that are read at once, and their b
 _MOST_LAYOUTS = 32  # of a topic; where there are more, the layouts of single messages are determined
 
 
-class _Block:
-    """The wanted fields of some messages: columns (n,) by name, the senders' stamps (n,) and which could be read (n,)."""
-
-    def __init__(self, count: int) -> None:
-        self.stamps = np.full(count, np.nan)
-        self.readable = np.ones(count, dtype=bool)
-        self.columns: dict[str, npt.NDArray[Any]] = {}
-
-    def column(self, name: str, *, is_text: bool) -> npt.NDArray[Any]:
-        """A column, empty at first."""
-        if name not in self.columns:
-            count = len(self.stamps)
-            self.columns[name] = np.full(count, None, dtype=object) if is_text else np.full(count, np.nan)
-        return self.columns[name]
-
-
 @dataclass
 class RosTopic(Topic):
     """A `Topic` whose messages come as bytes."""
@@ -106,12 +90,13 @@ class RosTopic(Topic):
 
     def _flush(self) -> None:
         """Read the messages that wait."""
-        raws, came, form = self._waiting, self._came, self._form
+        raws, came, form = self._waiting, np.array(self._came), self._form
         self._waiting, self._came, self._bytes = [], [], 0
-        block = _Block(len(raws))
         groups: dict[int, list[int]] = {}
         for row, raw in enumerate(raws):
             groups.setdefault(len(raw), []).append(row)
+        alike: list[tuple[Layout, npt.NDArray[np.intp], Bytes]] = []
+        readable = np.ones(len(raws), dtype=bool)
         for size, places in groups.items():
             rows = np.array(places, dtype=np.intp)
             data = np.frombuffer(b"".join([raws[k] for k in places]), np.uint8).reshape(len(rows), size)
@@ -119,33 +104,28 @@ class RosTopic(Topic):
             while len(rows) and form is not None:
                 layout = next(known, None) or self._new_layout(form, data[0].tobytes())
                 if layout is None:
-                    block.readable[rows[0]] = False
+                    readable[rows[0]] = False
                     rows, data = rows[1:], data[1:]
                     continue
                 fitting = layout.fits(data)
-                self._read(layout, rows[fitting], data[fitting], block)
+                alike.append((layout, rows[fitting], data[fitting]))
                 rows, data = rows[~fitting], data[~fitting]
-        self._append(np.array(came), block)
-
-    def _read(self, layout: Layout, rows: npt.NDArray[np.intp], data: Bytes, block: _Block) -> None:
-        """Read the messages (n, bytes) of a layout into their rows (n,)."""
-        block.stamps[rows] = layout.stamps(data)
-        for name, column in self._columns.items():
-            values = layout.values(column.path, data, is_text=column.is_text)
-            if values is None:
-                self.strange += len(rows)
-            else:
-                block.column(name, is_text=column.is_text)[rows] = values
-
-    def _append(self, came: npt.NDArray[np.float64], block: _Block) -> None:
-        known = block.readable
-        self.count += int(known.sum())
-        self.bad += int((~known).sum())
-        self._receipts.frombytes(came[known].tobytes())
-        self._stamps.frombytes(block.stamps[known].tobytes())
-        for name, column in self._columns.items():
-            values = block.column(name, is_text=column.is_text)[known]
+        self.count += int(readable.sum())
+        self.bad += int((~readable).sum())
+        stamps = np.full(len(raws), np.nan)
+        for layout, rows, data in alike:
+            stamps[rows] = layout.stamps(data)
+        self._receipts.frombytes(came[readable].tobytes())
+        self._stamps.frombytes(stamps[readable].tobytes())
+        for column in self._columns.values():
+            values = np.full(len(raws), None if column.is_text else np.nan)
+            for layout, rows, data in alike:
+                own = layout.values(column.path, data, is_text=column.is_text)
+                if own is None:
+                    self.strange += len(rows)
+                else:
+                    values[rows] = own
             if column.is_text:
-                column.texts.extend(values.tolist())
+                column.texts.extend(values[readable].tolist())
             else:
-                column.numbers.frombytes(values.tobytes())
+                column.numbers.frombytes(values[readable].tobytes())

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.formats.can.bits import decode
 from terragrip.formats.can.catalog import EXTENDED, Message, group_of
-from terragrip.formats.can.frames import NO_SENDER, Frames, Payloads, of_sender
+from terragrip.formats.can.frames import NO_SENDER, Block, Frames, of_sender
 from terragrip.formats.signals import Signal
 
 
@@ -20,6 +19,7 @@ def identifier_text(identifier: int) -> str:
 
 def names_of(frames: Frames) -> tuple[str, ...]:
     """All signals of the messages that occur; those of one of several senders also by ``Name@F0``."""
+    frames.flush()
     result: dict[str, None] = {}
     for (_, sender), message in frames.seen.items():
         for f in message.fields:
@@ -36,10 +36,13 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
     Where several senders give a message, a plain name is the signal of the sender with most valid samples, of the
     lowest address among equals.
     """
+    frames.flush()
     result: dict[str, Signal] = {}
     best: dict[str, tuple[int, int]] = {}  # plain name: valid samples, and the sender's address made negative
     several: set[str] = set()
     for (name, sender), kept in frames.kept.items():
+        if not kept:  # its lines could not be read
+            continue
         message = frames.seen[name, sender]
         shared = frames.senders(message) > 1
         for plain, signal in _decoded(frames, message, sender, kept).items():
@@ -52,7 +55,7 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
     return result, [*_on_senders(best, several), *_on_missing(result), *_on_frames(frames)]
 
 
-def _decoded(frames: Frames, message: Message, sender: int, kept: Payloads) -> dict[str, Signal]:
+def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -> dict[str, Signal]:
     names = {f.name: frames.catalog.name(message, f) for f in message.fields}
     wanted = {
         field
@@ -61,9 +64,9 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: Payloads) -> d
         or frames.wanted(name)
         or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
     }
-    time = np.frombuffer(kept.time, np.float64)
-    data = np.frombuffer(kept.data, np.uint8).reshape(len(time), kept.width)
-    lengths: npt.NDArray[np.uint16] = np.frombuffer(kept.lengths, np.uint16)
+    time, lengths = (np.concatenate([block[k] for block in kept]) for k in (0, 1))
+    width = int(lengths.max())
+    data = np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for _, _, part in kept])
     values = decode(message.fields, wanted, data, lengths)
     units = {f.name: f.unit for f in message.fields}
     return {names[field]: Signal(time, column, units[field]) for field, column in values.items()}

@@ -13,10 +13,9 @@ from terragrip.files import sha256
 from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
-from terragrip.formats.can.frames import Frames
+from terragrip.formats.can.frames import Frame, Frames
 from terragrip.formats.can.text_logs import (
     Count,
-    Frame,
     Numbered,
     asc_lines,
     by_python_can,
@@ -108,6 +107,7 @@ def finished(
 
     ``scale`` takes the stamps to seconds; ``refuse_unknown`` False lets a log pass that has other signals.
     """
+    frames.flush()
     if not frames.count:
         raise InputError("has no CAN frame", file=path, hint="check that the bus was recorded")
     if not frames.seen and refuse_unknown:
@@ -158,6 +158,7 @@ def _from_lines(
         for time, identifier, payload in parse(_bounded(lines), count, frames):
             frames.add(time, identifier, payload)
             last = time
+    frames.flush()
     if count.bad > _MOST_BAD * (count.bad + frames.count):
         problem, hint = (
             f"is a damaged {kind}, or none: {count.bad} lines have no frame",

@@ -12,9 +12,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from terragrip.formats.can.catalog import EXTENDED
-from terragrip.formats.can.frames import Frames
+from terragrip.formats.can.frames import Frame, Frames
 
-Frame = tuple[float, int, bytes]
 Numbered = tuple[int, str]
 """A line's number, and the line."""
 
