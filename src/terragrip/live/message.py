@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -17,24 +18,19 @@ _ESTIMATORS = 1024  # whose columns are kept
 _NOT_FINITE = re.compile(":(nan|-?inf)")
 
 
+@dataclass(slots=True, eq=False)
 class Message:
     """``kind`` is `ESTIMATE`, `EVENT`, `STATUS`, `SOIL`, `GROUND` or `SETPOINT`; ``row`` is there for an estimate, ``data`` for others.
 
     ``vehicle``: its name where many are served, else empty.
     """
 
-    __slots__ = ("_json", "data", "kind", "row", "time", "vehicle")
-
-    def __init__(
-        self,
-        kind: str,
-        time: float,
-        row: Row | None = None,
-        data: dict[str, Any] | None = None,
-        vehicle: str = "",
-    ) -> None:
-        self.kind, self.time, self.row, self.data, self.vehicle = kind, time, row, data, vehicle
-        self._json: dict[Columns | None, bytes] = {}
+    kind: str
+    time: float
+    row: Row | None = None
+    data: dict[str, Any] | None = None
+    vehicle: str = ""
+    _json: dict[Columns | None, bytes] = field(default_factory=dict)
 
     @classmethod
     def of_event(cls, event: Event, vehicle: str = "") -> Message:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError, suggestion
 from terragrip.listing import listed, profile_in
@@ -38,8 +38,9 @@ class Roster:
                 "no vehicle is named", place="--vehicle", hint="name a vehicle file, or an --index"
             )
         self._vehicle, self._profile, self._index = vehicle, profile, index
-        self._vehicles: dict[tuple[Path, int], Vehicle] = {}  # by file and when it was changed
-        self._profiles: dict[tuple[Path, int], Profile] = {}
+        self._files: dict[
+            tuple[str, Path, int], Vehicle | Profile
+        ] = {}  # by kind, file and when it was changed
         self._changed: int | None = None
         self._rows: dict[str, tuple[Path | None, Path | None]] = {}
         self.refresh()
@@ -66,23 +67,19 @@ class Roster:
         if vehicle is None:
             hint = suggestion(name, self._rows, "add its row, or give --vehicle for all others")
             raise InputError(f"names no vehicle file for {name}", file=self._index, hint=hint)
-        return Entry(self._vehicle_of(vehicle), None if profile is None else self._profile_of(profile))
+        return Entry(
+            self._loaded("vehicle", vehicle), None if profile is None else self._loaded("profile", profile)
+        )
 
-    def _vehicle_of(self, path: Path) -> Vehicle:
+    def _loaded(self, kind: str, path: Path) -> Any:
+        """The vehicle or the profile in a file, read once for each change of it."""
+        from terragrip.formats import Profile
         from terragrip.vehicle import Vehicle
 
-        key = path, _changed(path)
-        if key not in self._vehicles:
-            self._vehicles[key] = Vehicle.load(path)
-        return self._vehicles[key]
-
-    def _profile_of(self, path: Path) -> Profile:
-        from terragrip.formats import Profile
-
-        key = path, _changed(path)
-        if key not in self._profiles:
-            self._profiles[key] = Profile.load(path)
-        return self._profiles[key]
+        key = kind, path, _changed(path)
+        if key not in self._files:
+            self._files[key] = (Vehicle if kind == "vehicle" else Profile).load(path)
+        return self._files[key]
 
 
 def _rows(index: Path) -> dict[str, tuple[Path | None, Path | None]]:
