@@ -34,7 +34,7 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
             break
     time, columns = first_speeds(ahead)
     lag = lag_within(time, columns)
-    if lag is None or not lag.is_to_set_right:
+    if lag is None or not lag.is_to_correct:
         yield from (_as_it_is(block, lag) for block in chain(ahead, source))
         return
     shift = _Shift.by(lag, time, columns)

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-_CALM, _SLOW = 0.6, 12.0  # s: what changes faster is noise, and slower the ground
+_CALM, _SLOW = 0.6, 12.0  # s: faster changes are noise, slower ones the ground
 _MOVING = 0.1  # of the speed that a twentieth of the drive exceeds
 _SLIP = 0.3  # beyond, resistance grows with the pull
 _LEAST = 20.0  # s of driving
 _BLOCKS = 12  # for the jackknife
-_ALONE = 0.8  # share of the rims' change in one block: a single start has no scatter to be judged by
+_ALONE = 0.8  # share of the rims' change in one block: a single start has no scatter
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
-_ACCELERATION = 1.8  # an accelerometer's scale, and what a late ground speed makes of it
+_ACCELERATION = 1.8  # an accelerometer's scale, with the effect of a late ground speed
 _FORCE = 1.3  # an uncalibrated torque, an estimated mass
 
 
@@ -50,6 +50,7 @@ class Range:
 
     @property
     def holds_one(self) -> bool:
+        """Whether 1 is within the bounds."""
         return self.low <= 1.0 <= self.high
 
 
@@ -125,7 +126,7 @@ class Courses:
         return cls(quick(rate), quick(change), shown, thrust, pull)
 
     def slopes(self, y: Floats, *beside: Floats) -> list[Range] | None:
-        """y (n,) over the change of speed, and over each of ``beside``; None where the rims tell nothing of that change."""
+        """y (n,) over the change of speed, and over each of ``beside``; None where the rims do not follow that change."""
         if not float(np.corrcoef(self.rims, self.change)[0, 1]) > _ALIKE:
             return None
         one = np.ones(len(y))
@@ -162,7 +163,7 @@ def acceleration_warnings(courses: Courses | None) -> list[str]:
 
 
 def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
-    """A sentence on torques, drawbar force and mass that do not go together, and which of them is off by what goes with each."""
+    """A sentence on torques, drawbar force and mass that contradict each other, and which of them may be wrong."""
     if courses is None or courses.thrust is None or courses.pull is None:
         return []
     mass, pull = courses.slopes(courses.thrust, courses.pull) or (_RIGHT, _RIGHT)

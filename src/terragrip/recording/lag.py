@@ -67,7 +67,7 @@ class Lag:
         return max(least - self.seconds, self.seconds - most) > _CERTAIN * self.std
 
     @property
-    def is_to_set_right(self) -> bool:
+    def is_to_correct(self) -> bool:
         """Whether it is certain enough for an automatic correction: on yielding soil a ground speed is late, too, by more
         than firm ground explains, but not always by as much.
         """

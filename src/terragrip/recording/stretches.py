@@ -53,5 +53,6 @@ def gaps(when: Floats) -> Bools:
 
 
 def is_one_value(values: Floats) -> bool:
+    """Whether the finite values, three at least, are all equal."""
     known = values[np.isfinite(values)]
     return len(known) > 2 and bool(np.ptp(known) == 0.0)
