@@ -34,8 +34,8 @@ class Agreement:
 class NisConsistency:
     """Normalised innovation squared against its chi-square law.
 
-    `ratio` is sum(NIS) / sum(channels): 1 for a filter whose noise settings are right, above 1 for one that
-    is too sure of itself. `within` is the share of rows inside the two-sided interval of `probability`.
+    `ratio` is sum(NIS) / sum(channels): 1 for a filter whose noise settings are right, above 1 where
+    intervals are too narrow. `within` is the share of rows inside the two-sided interval of `probability`.
     """
 
     count: int

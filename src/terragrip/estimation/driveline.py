@@ -78,7 +78,7 @@ class DrivenMachine:
     ) -> DrivenMachine:
         """While samples of these ``channels`` come in: as the vehicle file has it, or an earlier log (``known``, by `to_dict`).
 
-        What a bus may tell or not (drawbar force, the engine's friction) is as if it did not, until it does. Raises InputError as `of_log`.
+        What a bus may send or not (drawbar force, the engine's friction) is as if it did not, until it does. Raises InputError as `of_log`.
         """
         assert vehicle.driveline is not None
         if known is not None:

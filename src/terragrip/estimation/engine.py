@@ -118,7 +118,7 @@ class Engine:
         return float(settings.standstill_speed)
 
     def update(self, time: float, sample: Mapping[str, Any]) -> int:
-        """Take a sample and fill ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
+        """Process a sample into ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
         self._pack(self._room_in, 0, time, *map(sample.get, self._names, _MISSING))
         status: int = lib.tg_estimator_update(self.handle, self.sample, self.estimate)
         return status
@@ -138,7 +138,7 @@ class Engine:
         event: npt.NDArray[np.uint8],
         progress: Callable[[int], None] | None = None,
     ) -> None:
-        """Take rows of contiguous columns (n,) and write those of ``out`` (n,) and the event codes.
+        """Process rows of contiguous columns (n,) and write those of ``out`` (n,) and the event codes.
 
         ``progress`` is called with the rows done. Raises InputError with the row where the kernel refuses one; the rows before it
         have been taken.
@@ -169,7 +169,7 @@ class Engine:
         return np.zeros(lib.tg_smooth_carry(self.handle))
 
     def record(self, time: Floats, columns: Mapping[str, Floats]) -> Floats:
-        """Take rows and return their records (n, length), for `smooth`."""
+        """Process rows and return their records (n, length), for `smooth`."""
         records = np.empty((len(time), lib.tg_smooth_length(self.handle)))
         sources = _pointers({self.slots_in[k]: v for k, v in columns.items()}, lib.TG_SLOTS, 0)
         _require(
@@ -227,7 +227,7 @@ _HINTS = {
 
 
 def refusal(status: int, place: str | None) -> InputError:
-    """The error for a tg_status that a sample or a snapshot came back with."""
+    """The error for the tg_status of a refused sample or snapshot."""
     return InputError(_STATUS.get(status, f"status {status}"), place=place, hint=_HINTS.get(status))
 
 

@@ -128,7 +128,7 @@ class EngineEstimator(TractionEstimator):
         )
 
     def snapshot(self) -> bytes:
-        """Everything needed to go on later, bit for bit."""
+        """Everything needed to continue later, bit for bit."""
         about = {
             "machine": self.machine.to_dict(),
             "given": self.given,
@@ -177,7 +177,7 @@ class _Tail:
         return self._rows[self._place[name], self._first : self._end]
 
     def add(self, time: float, values: list[float]) -> None:
-        """Behind the others, of which the too old ones go."""
+        """Append a row, and drop those that are too old."""
         if self._end == self._rows.shape[1]:
             kept = self._rows[:, self._first : self._end]
             rows = self._rows if 2 * kept.shape[1] <= self._end else np.empty((len(kept), 2 * self._end))

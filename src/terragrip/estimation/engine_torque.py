@@ -102,8 +102,8 @@ class EngineTorque:
 
 @dataclass(frozen=True)
 class DrivelineTorque:
-    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside; ``std`` (n,) [N m]: of what
-    stands in that row, NaN where nothing does; ``shift`` (n,): rows of a gear shift."""
+    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside; ``std`` (n,) [N m]
+    of the value in that row, NaN where there is none; ``shift`` (n,): rows of a gear shift."""
 
     torque: Floats
     std: Floats

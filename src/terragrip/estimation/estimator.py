@@ -224,7 +224,7 @@ class TractionEstimator:
         return self.update_at(time, sample)
 
     def _accept(self, names: Collection[str]) -> None:
-        """Know the names of a sample's columns; raises InputError on one that is mistyped."""
+        """Remember the names of a sample's columns; raises InputError on one that is mistyped."""
         owners = ("", *self.vehicle.wheels, *self.vehicle.axle_names)
         for name in set(names) - self._accepted:
             own = is_own(name) and (split_channel(name) or ("", ""))[1] in owners
@@ -243,7 +243,7 @@ class TractionEstimator:
         return self._engine.inputs
 
     def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
-        """As `update`, with the instant [s] as an argument beside the sample, and no look at its names."""
+        """As `update`, with the instant [s] as an argument beside the sample, and without a check of its names."""
         engine = self._engine
         try:
             status = engine.update(time, sample)

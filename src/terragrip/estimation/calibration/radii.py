@@ -265,7 +265,7 @@ def _typical(size: Floats, used: Bools, stretch: Ints) -> Floats:
 
 
 def _less_offsets(rows: Floats, effect: Floats, stretch: Ints, std: Floats) -> tuple[Floats, Floats]:
-    """Rows (n, w, k) whitened for an offset of SD std (m,) that a stretch's share, and the last column's offsets (m,).
+    """Rows (n, w, k) whitened for an offset of SD std (m,) that a stretch's rows share, and the last column's offsets (m,).
 
     ``effect`` (n, w) is what an offset of 1 adds to a row: I + σ² u uᵀ has the inverse root I - (1 - 1/√(1 + σ²|u|²)) u uᵀ/|u|².
     """

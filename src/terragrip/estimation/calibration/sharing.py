@@ -223,7 +223,7 @@ class _Problem:
         return np.asarray(by_yaw - by_yaw.mean(axis=1, keepdims=True))
 
     def fit(self, values: Floats, scale: float) -> _Fit:
-        """Linearise at the values; ``scale`` is the design effect that the priors are weighed with."""
+        """Linearise at the values; ``scale`` is the design effect that the priors are weighted with."""
         n, w = self.data.torque.shape
         level, residual, spread = self._levels(values)
         gain = np.exp(values[:w])
@@ -263,7 +263,7 @@ class _Problem:
         return np.asarray(move)
 
     def solve(self, values: Floats, scale: float) -> Floats:
-        """Gauss-Newton steps until the gains rest."""
+        """Gauss-Newton steps until the gains converge."""
         w = self.data.torque.shape[1]
         for _ in range(_ROUNDS):
             move = self.step(values, scale)

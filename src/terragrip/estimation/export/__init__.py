@@ -1,4 +1,4 @@
-"""Estimates in the files of others: what each suffix can hold, and who writes it.
+"""Estimates in other file formats: what each suffix can hold, and which class writes it.
 
 A writer receives consecutive parts of one table, the first when it is made, and is closed or, after a failure, dropped.
 """
@@ -32,7 +32,7 @@ class TableWriter(Protocol):
         ...
 
     def drop(self) -> None:
-        """Let go of the file, whose rest will not come."""
+        """Discard the file, which stays incomplete."""
         ...
 
 
