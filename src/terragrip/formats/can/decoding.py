@@ -65,8 +65,12 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
         or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
     }
     time, lengths = (np.concatenate([block[k] for block in kept]) for k in (0, 1))
-    width = int(lengths.max())
-    data = np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for _, _, part in kept])
+    data = np.zeros((len(time), int(lengths.max())), np.uint8)
+    row = 0
+    while kept:  # one by one, so that payloads do not stand twice
+        part = kept.pop(0)[2]
+        data[row : row + len(part), : part.shape[1]] = part
+        row += len(part)
     values = decode(message.fields, wanted, data, lengths)
     units = {f.name: f.unit for f in message.fields}
     return {names[field]: Signal(time, column, units[field]) for field, column in values.items()}

@@ -20,7 +20,7 @@ NO_SENDER = -1
 Frame = tuple[float, int, bytes]
 """Stamp [s], identifier with `EXTENDED` set where it has 29 bits, payload."""
 Bytes = npt.NDArray[np.uint8]
-Block = tuple[Floats, Ints, Bytes]
+Block = tuple[Floats, npt.NDArray[np.uint16], Bytes]
 """Stamps (n,) [s], lengths (n,) and payloads (n, bytes) of frames."""
 Part = Callable[[bytes], tuple[int, bytes] | None]
 """Takes a part of a longer message; gives group and payload of one that is whole."""
@@ -51,9 +51,12 @@ class Frames:
     _waiting: list[Frame] = field(default_factory=list)
     _number: int = 0  # frames so far, with those left out
 
+    def __post_init__(self) -> None:
+        self._every = every_of(self.wanted)
+
     def add(self, time: float, identifier: int, payload: bytes) -> None:
         """Add a data frame."""
-        if self.leaves_out_next():
+        if self._every > 1 and self.leaves_out_next():
             return
         self._number += 1
         self._waiting.append((time, identifier, payload))
@@ -67,7 +70,7 @@ class Frames:
 
     def add_many(self, time: Floats, identifiers: Ints, lengths: Ints, data: Bytes) -> None:
         """Add data frames (n,) with payloads (n, bytes), as `add` does one by one."""
-        read = (self._number + np.arange(len(time))) // _BLOCK % every_of(self.wanted) == 0
+        read = (self._number + np.arange(len(time))) // _BLOCK % self._every == 0
         self._number += len(time)
         self._sort(time[read], identifiers[read], lengths[read], data[read])
 
@@ -82,7 +85,8 @@ class Frames:
         for identifier in np.unique(identifiers).tolist():
             route, rows = self._route_of(identifier, whole=whole), identifiers == identifier
             if isinstance(route, list):
-                route.append((time[rows], lengths[rows], data[rows][:, : lengths[rows].max()]))
+                held = lengths[rows].astype(np.uint16)
+                route.append((time[rows], held, data[rows, : held.max()]))
             elif route is not None:
                 parts |= rows  # whose order counts
             elif identifier in self.unknown:
@@ -107,7 +111,7 @@ class Frames:
     def are_unwanted(self, identifier: int) -> bool:
         """Whether frames of an identifier are of no use, so that they need not be parsed: `pass_by` counts them."""
         # Of a log that is looked at in parts all are counted, to leave out blocks of them.
-        return every_of(self.wanted) == 1 and self._route_of(identifier) is None
+        return self._every == 1 and self._route_of(identifier) is None
 
     def pass_by(self, identifier: int) -> None:
         """Count a data frame of which nothing is wanted."""
@@ -147,12 +151,10 @@ class Frames:
 
 def _block(frames: list[Frame]) -> tuple[Floats, Ints, Ints, Bytes]:
     """Stamps, identifiers, lengths (n,) and payloads (n, bytes) of frames."""
-    lengths = np.array([len(payload) for _, _, payload in frames], dtype=np.intp)
+    time, identifiers, payloads = zip(*frames, strict=True) if frames else ((), (), ())
+    lengths = np.fromiter(map(len, payloads), np.intp, len(payloads))
     width = int(lengths.max(initial=1))
-    data = b"".join([payload.ljust(width, b"\0") for _, _, payload in frames])
-    return (
-        np.array([time for time, _, _ in frames]),
-        np.array([identifier for _, identifier, _ in frames], dtype=np.intp),
-        lengths,
-        np.frombuffer(data, np.uint8).reshape(-1, width),
-    )
+    if lengths.min(initial=width) < width:
+        payloads = tuple(payload.ljust(width, b"\0") for payload in payloads)
+    data = np.frombuffer(b"".join(payloads), np.uint8).reshape(-1, width)
+    return np.array(time), np.array(identifiers, dtype=np.intp), lengths, data
