@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from sklearn.ensemble import ExtraTreesClassifier
 from sklearn.svm import SVC
 
 from terragrip.ground.classification.channels import Channel
-from terragrip.ground.classification.expert import calibrate, probabilities
+from terragrip.ground.classification.expert import Examples, calibrate, probabilities, train
 from terragrip.ground.classification.forest import Forest
 from terragrip.ground.classification.kernel_machine import PENALTY, WIDTH, KernelMachine, votes
 from terragrip.ground.classification.training_set import deal
@@ -141,6 +142,19 @@ def test_numpy_evaluates_the_forest_as_scikit_learn_does(classes: int) -> None:
     ours = Forest.fit(points, codes, seed=3)
     expected = theirs.predict_proba(np.where(np.isfinite(fresh), fresh, mean))
     np.testing.assert_allclose(np.exp(ours.decide(fresh)), expected + 0.01, atol=1e-6)
+
+
+def test_training_leaves_the_warning_filters_as_they_are() -> None:
+    """scikit-learn changes them for each tree: forests of two threads emptied them, and it then warned of that itself."""
+    names = ("wheel speed: pace", "wheel speed: at fl pace", "torque: size", "torque: at fl size")
+    codes, groups = np.arange(120) % 2, np.arange(120) // 10
+    features = np.random.default_rng(0).standard_normal((120, 4)) + codes[:, None]
+    windows = Examples(features, codes, groups, np.arange(120.0), groups % 4)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "one of the caller's")
+        before = list(warnings.filters)
+        train(frozenset({"wheel speed", "torque"}), names, windows, threads=4, seed=0)
+        assert warnings.filters == before
 
 
 @pytest.mark.parametrize(

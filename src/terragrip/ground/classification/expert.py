@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -47,8 +48,8 @@ class Parts:
     law: MotionLaw | None
 
     @classmethod
-    def fit(cls, names: tuple[str, ...], windows: Examples, rows: Bools, seed: int) -> Parts:
-        """Fit all parts to some ``rows`` (n,) of the windows, whose features have these names."""
+    def fit(cls, names: tuple[str, ...], windows: Examples, rows: Bools, forest: Forest | None) -> Parts:
+        """Fit all other parts to the ``rows`` (n,) of the windows that the forest was fitted to; their features have these names."""
         roles, features, codes = roles_of(names), windows.features[rows], windows.codes[rows]
         own = features[:, roles.machine]
         scaling = Standardization.fit(own, codes, windows.groups[rows])
@@ -56,7 +57,6 @@ class Parts:
         law = (
             MotionLaw.fit(features[:, roles.motion], features[:, roles.effects], codes) if roles.law else None
         )
-        forest = Forest.fit(features, codes, seed) if roles.forest else None
         machine = KernelMachine.fit(points, codes)
         return cls(scaling, machine, Discriminants.fit(points, codes), forest, law)
 
@@ -99,11 +99,17 @@ def train(
     codes, folds = windows.codes, windows.folds
     everything = np.ones(len(codes), dtype=bool)
     learnt_from = [everything, *(folds != fold for fold in range(int(folds.max()) + 1))]
-    # The solvers work outside the interpreter's lock; threads of the linear algebra's own would only wait for one another.
-    with _one_thread_each(), ThreadPoolExecutor(threads) as pool:
-        fitted = list(pool.map(lambda rows: Parts.fit(names, windows, rows, seed), learnt_from))
-        held_out = [(parts, windows.features[folds == k]) for k, parts in enumerate(fitted[1:])]
-        result = list(pool.map(lambda pair: pair[0].decide(names, pair[1]), held_out))
+    # scikit-learn changes the process's warning filters meanwhile, a forest for each of its trees: no two forests at a time.
+    with _one_thread_each(), warnings.catch_warnings():
+        forests = [
+            Forest.fit(windows.features[rows], codes[rows], seed) if roles_of(names).forest else None
+            for rows in learnt_from
+        ]
+        # The solvers work outside the interpreter's lock; threads of the linear algebra's own would only wait for one another.
+        with ThreadPoolExecutor(threads) as pool:
+            fitted = list(pool.map(lambda *given: Parts.fit(names, windows, *given), learnt_from, forests))
+            held_out = [(parts, windows.features[folds == k]) for k, parts in enumerate(fitted[1:])]
+            result = list(pool.map(lambda pair: pair[0].decide(names, pair[1]), held_out))
     scores = np.empty((len(result[0][0]), len(codes), result[0][0].shape[2]))
     odd = np.empty((len(result[0][1]), len(codes)))
     for fold, (of_scores, of_odd) in enumerate(result):
