@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import os
 import sys
 import warnings
@@ -96,6 +98,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0 done; 2 the input or the call is unusable (one line on standard error); 1 a defect of Terragrip (one
     line that says where the traceback is); 130 interrupted; 141 the reader of standard output went away.
     """
+    if arguments is None:
+        _search_little_garbage()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     if not (debug or "--verbose" in words):
@@ -115,6 +119,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as interruption:
         return report(interruption, words, debug)
     return code
+
+
+def _search_little_garbage() -> None:
+    """The collector looks less often, and not at all at the end, when it would look through all that was imported: both are a fifth
+    of a short command's time."""
+    gc.set_threshold(20_000)
+    atexit.register(gc.freeze)
 
 
 def _run(words: Sequence[str]) -> int:
