@@ -116,7 +116,7 @@ def test_lengths_grow_with_the_machine() -> None:
         (["--class", "rover", "--signals", "can"], "--signals", "say torque, wheel-speeds, bus-speed"),
         (["--class", "rover", "--mass", "3 m"], "mass", "use a unit such as 'kg'"),
         (["--class", "rover", "--mass", "-3"], "mass", "give a positive number"),
-        (["--class", "rover", "--hitch-height", "1 m"], "hitch_height", "asked for are"),
+        (["--class", "rover", "--hitch-height", "1 m"], "hitch_height", "it uses mass"),
         (["--class", "rover", "--wheel-radius", "110"], "wheel.radius", "write '110 mm'"),
         (
             ["--class", "tractor-4wd", "--mass", "3 t", "--front-mass", "4 t"],

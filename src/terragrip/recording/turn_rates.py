@@ -139,7 +139,7 @@ def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> 
         return ""
     return (
         f"In turns the hubs differ from side to side by {share:.2f} times what the rims do, by angular_velocity_z and a track of "
-        f"{vehicle.track:.3g} m, where {least} to {_MOST} is possible: check the track (between the wheels' middles), the radii, and the "
+        f"{vehicle.track:.3g} m, where {least} to {_MOST} is possible: check the track (between the wheel centres), the radii, and the "
         "gyroscope's scale. Slips are wrong in turns."
     )
 

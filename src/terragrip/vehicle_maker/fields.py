@@ -1,4 +1,4 @@
-"""What is asked of a machine, by class and by what its log measures."""
+"""The numbers asked of a machine, by class and by what its log measures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIGNALS: dict[str, str] = {
 
 
 NOTHING = "none"
-"""What stands for a number that nothing is assumed for."""
+"""The text in place of a number for which nothing is assumed."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ _FIELDS: tuple[tuple[str, str, str], ...] = (
     ("mass", "mass, ready to work", "kg"),
     (
         "front_mass",
-        "mass on the front axle, at rest (of three axles the others carry alike what is left)",
+        "mass on the front axle, at rest (of three axles, the other two share the rest equally)",
         "kg",
     ),
     ("wheelbase", "wheelbase", "m"),
-    ("track", "track, between the wheels' middles", "m"),
+    ("track", "track, between the wheel centres", "m"),
     ("center_of_gravity_height", "height of the centre of gravity", "m"),
     ("hitch_height", "height of the hitch", "m"),
-    ("wheel_radius", "rolling radius of the wheels (of the rear ones where the front ones are smaller)", "m"),
+    ("wheel_radius", "rolling radius of the wheels (of the rear ones, if the front ones are smaller)", "m"),
     ("front_wheel_radius", "rolling radius of the front wheels", "m"),
     ("wheel_inertia", "moment of inertia of a wheel with its geared drive", "kg m^2"),
     ("tire_rolling_resistance", "rolling resistance of the tyres on hard ground, share of the load", "1"),
@@ -150,7 +150,7 @@ def read_values(machine: MachineClass, signals: Signals, given: Mapping[str, obj
         if value is None:
             continue
         if name not in asked:
-            hint = suggestion(name, asked, f"asked for are {', '.join(asked) or 'none'}")
+            hint = suggestion(name, asked, f"it uses {', '.join(asked) or 'no number'}")
             raise InputError(
                 f"a {machine.name} known by its {signals} has no use for it", place=name, hint=hint
             )
