@@ -176,7 +176,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
     entry: dict[str, object] = {"from": guess.column.column}
     target = unit_of(channel)
     unit, give = guess.unit, ""
-    told: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
     kind = kind_of(unit)
     if channel.startswith("drive_torque_") and kind in ("current", None) and guess.column.name.has("current"):
         entry |= {"scale": 1.0, "unit": "N m"} if guess.column.unit else {"scale": 1.0}
@@ -188,12 +188,12 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         if radius is None:
             give = f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
         else:
-            told = (f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m",)
+            shown = (f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m",)
     elif unit and target and (unit != target or guess.column.stated not in (None, unit)):
         entry["unit"] = unit
     if (
         guess.column.name.has("motor")
-        and not (give or told)
+        and not (give or shown)
         and channel.startswith(("wheel_speed_", "drive_torque_"))
     ):
         entry |= {"scale": 1.0} | ({"unit": unit} if unit and unit != target else {})
@@ -206,7 +206,7 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         doubt,
         give,
         round(guess.confidence, 2),
-        (*guess.evidence, *told),
+        (*guess.evidence, *shown),
         tuple(_proposal(channel, g, [], vehicle) for g in others[:3]),
         unit or None,
     )

@@ -41,12 +41,12 @@ _UNEQUAL, _APART = 0.14, 0.07
 class RimUnit:
     """What radii and ground speed say of the wheels' unit: each ``possible`` one with ground over rim speed in it, the likeliest first.
 
-    ``ground``: the columns that say how fast the ground went. ``told_by_axles``: axles of unequal wheels ruled other units out.
+    ``ground``: the columns of ground speed. ``shown_by_axles``: axles of unequal wheels ruled other units out.
     """
 
     ground: str
     possible: Mapping[str, float]
-    told_by_axles: bool = False
+    shown_by_axles: bool = False
 
     @property
     def unit(self) -> str | None:
@@ -67,8 +67,8 @@ class RimUnit:
         if not self.possible:
             return f"with a radius of {radius:.3g} m the rims are not as fast as {self.ground} in any unit"
         parts = [f"{1 / share:.2f} times in {unit}" for unit, share in self.possible.items()]
-        axles = ", as the unequal wheels of two axles also show" if self.told_by_axles else ""
-        only = ", in no other unit near it" if self.is_sure and not self.told_by_axles else ""
+        axles = ", as the unequal wheels of two axles also show" if self.shown_by_axles else ""
+        only = ", in no other unit near it" if self.is_sure and not self.shown_by_axles else ""
         return f"with a radius of {radius:.3g} m the rims go as fast as {self.ground} {' or '.join(parts)}{only}{axles}"
 
     def judge(self, guess: Guess, radius: float) -> Guess:
@@ -140,7 +140,7 @@ def rim_unit(
     kept = {u: s for u, s in possible.items() if kind is None or u in kind}
     # The usual ones first, then by how near the rims are to the ground's speed.
     ranked = sorted(kept.items(), key=lambda item: (not _is_usual(*item), abs(np.log(item[1]))))
-    return RimUnit(source, dict(ranked), told_by_axles=len(kept) < len(possible))
+    return RimUnit(source, dict(ranked), shown_by_axles=len(kept) < len(possible))
 
 
 def _is_usual(unit: str, share: float) -> bool:
