@@ -42,12 +42,13 @@ def estimated(log: Path, machine: str, method: str = "kalman") -> tuple[Recordin
 
 
 def assert_complete(estimates: Estimates) -> None:
-    """Adhesion and its spread in every row; slip in every row but at rest or in a gap; no spread that is no number."""
+    """Adhesion and its spread in every row but in a gap (few); slip in every row but at rest or in a gap; no spread that is no number."""
     at_rest, blind = estimates.event_codes == STANDSTILL, estimates.event_codes == EVENTS.index("gap")
     for wheel in estimates.wheels:
         for quantity in ("adhesion", "net_traction"):
-            assert np.isfinite(estimates[f"{quantity}_{wheel}"]).all()
-            assert (estimates[f"{quantity}_{wheel}_std"] > 0).all()
+            assert np.isfinite(estimates[f"{quantity}_{wheel}"][~blind]).all()
+            assert (estimates[f"{quantity}_{wheel}_std"][~blind] > 0).all()
+            assert np.isfinite(estimates[f"{quantity}_{wheel}"]).mean() > 0.99
         started = np.cumsum(np.isfinite(estimates[f"wheel_speed_{wheel}"])) > 0
         assert np.isfinite(estimates[f"slip_{wheel}"][~at_rest & ~blind & started]).all()
         assert np.isnan(estimates[f"slip_{wheel}"][at_rest]).all()

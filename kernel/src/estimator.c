@@ -186,6 +186,27 @@ static int32_t wheels_are_silent(const tg_estimator *e, double time)
     return 1;
 }
 
+/* Not measured for longer than a gap and ten of its intervals (of at most half a gap), or not yet. */
+static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
+{
+    const tg_real gap = e->settings.gap, most = gap / 2;
+    return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
+}
+
+/* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured: the thrust of such a wheel is
+ * unknown, so neither it nor the soil's resistance is told by the rest, and of a wheel without a speed there is no slip. */
+static int32_t listen(tg_estimator *e, double time)
+{
+    const tg_settings *s = &e->settings;
+    int32_t silent = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const int32_t speed = is_silent(e, &e->wheel[i], time), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
+        e->scene.silent[i] = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap ? 0 : speed ? 2 : (tg_real)torque;
+        silent |= e->scene.silent[i] > 0;
+    }
+    return silent;
+}
+
 #define TG_PEAK ((tg_real)2.4674) /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
 
 /* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. */
@@ -211,6 +232,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
+    e->scene.unheard = (tg_real)listen(e, out->time);
     e->scene.roughness = e->roughness.wander;
     e->scene.weight = drive->mass * e->settings.machine.gravity + drive->hitch_load;
     e->scene.unseen_load = tgi_unseen_load(e);
@@ -243,7 +265,7 @@ static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
     for (int32_t i = 0; i < e->settings.machine.wheels; i++)
         if (e->wheel[i].count > 0 && e->wheel[i].time == row->time) e->unseen &= ~1;
     if (e->ground.count > 0 && e->ground.time == row->time) e->unseen &= ~2;
-    return e->unseen != 0 || wheels_are_silent(e, row->time);
+    return e->unseen != 0 || e->scene.unheard > 0 || wheels_are_silent(e, row->time);
 }
 
 /* What blinds comes first, then what stops the vehicle. */

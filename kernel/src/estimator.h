@@ -48,6 +48,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
     tg_real chatter[8]; /* wheel: variance of an adhesion that alternates from sample to sample, see inputs.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
+    tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */
+    tg_real unheard; /* whether any is */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of the variation of rho_s over uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */

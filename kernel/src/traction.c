@@ -111,6 +111,16 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
     blank(o, TG_OUT_WHEEL_SPEED_STD, n);
 }
 
+/* Of what only all wheels' speeds and torques tell, nothing while one of them is silent. */
+static void leave_unheard(const tgi_scene *scene, int32_t n, tg_real *o)
+{
+    const int32_t undefined[] = {TG_OUT_ADHESION, TG_OUT_ADHESION_STD, TG_OUT_NET_TRACTION, TG_OUT_NET_TRACTION_STD, TG_OUT_EFFICIENCY, TG_OUT_EFFICIENCY_STD};
+    for (int32_t k = 0; k < 6; k++) blank(o, undefined[k], n);
+    blank(o, TG_OUT_SOIL_RESISTANCE, 2);
+    for (int32_t i = 0; i < n; i++)
+        if (scene->silent[i] > 1) o[TG_OUT_SLIP + i] = o[TG_OUT_SLIP_STD + i] = o[TG_OUT_WHEEL_SPEED + i] = o[TG_OUT_WHEEL_SPEED_STD + i] = (tg_real)NAN;
+}
+
 /* All values that follow from the belief; in place of `warp`, what its adhesions are beyond all trends, they have the scene's (warp.c).
  * Speeds get back the vehicle's own signs; mu, rho_s, slip and kappa stay in the direction of travel. */
 void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, const tg_belief *restrict b, const tg_real (*restrict S)[TG_MAX_CONSIDERED],
@@ -130,5 +140,6 @@ void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, c
         o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];
     }
+    if (scene->unheard > 0) leave_unheard(scene, n, o);
     if (scene->standing || !scene->seen_motion) leave_open(scene, n, o);
 }

@@ -171,12 +171,11 @@ def test_turning_back_starts_the_motion_anew():
 def test_a_channel_may_begin_late(missing):
     base = drive(20.0)
     estimates = run(with_values(base.recording, missing, slice(0, 500), np.nan))
-    assert np.isfinite(estimates["adhesion_rr"]).all()
-    assert np.isfinite(estimates["slip_fl"]).all()
+    late = (estimates["event"] != "standstill") & (np.arange(2000) < 500)
+    assert (estimates["event"][late] == "gap").all() == missing.endswith(("_fl", "_rr"))
     for name in ("adhesion_rr", "slip_fl", "soil_resistance"):
+        assert np.isfinite(estimates[name][500:]).all()
         assert np.abs(estimates[name] - base.truth[name])[1000:].mean() < 0.02, name
-    if missing == "drive_torque_rr":
-        assert estimates["adhesion_rr_std"][400] > 5 * estimates["adhesion_rr_std"][1500]
 
 
 def test_before_the_first_speed_there_is_a_gap():
@@ -188,6 +187,33 @@ def test_before_the_first_speed_there_is_a_gap():
     assert np.isnan(estimates["slip_rr"][:100]).all()
     assert np.isfinite(estimates["adhesion_rr"]).all()
     assert np.isfinite(estimates["slip_rr"][100:]).all()
+
+
+@pytest.mark.parametrize("lost", ["wheel_speed_fl", "drive_torque_fl"])
+def test_a_wheel_that_falls_silent_is_no_slip_and_leaves_no_adhesion(lost):
+    """It came out as slip .98 ± .01, "stuck", and an adhesion of -.6 ± .5; the soil's resistance was held 7 SD off."""
+    base = drive(40.0)
+    silent = (base.recording.time > 10) & (base.recording.time < 30)
+    estimates = run(with_values(base.recording, lost, silent, np.nan))
+    deep = (base.recording.time > 13) & (base.recording.time < 30)
+    assert set(estimates["event"][deep]) == {"gap"}
+    unknown = ["adhesion_fl", "adhesion_rr", "soil_resistance", "net_traction_rr", "efficiency_rr"]
+    for name in [*unknown, *["slip_fl"] * lost.startswith("wheel")]:
+        assert np.isnan(estimates[name][deep]).all(), name
+        assert np.isnan(estimates[f"{name}_std"][deep]).all(), name
+    assert np.abs(estimates["slip_rr"] - base.truth["slip_rr"])[deep].mean() < 0.02
+    for name in ("adhesion_rr", "adhesion_fl", "slip_fl", "soil_resistance"):
+        off, sure = np.abs(estimates[name] - base.truth[name])[3200:], estimates[f"{name}_std"][3200:]
+        assert np.mean(off < 1.96 * sure) > 0.8, name
+
+
+def test_a_torque_every_two_seconds_is_not_silent():
+    base = drive(40.0)
+    recording = base.recording
+    rows = np.arange(len(recording)) % 200 != 0
+    for wheel in WHEELS:
+        recording = with_values(recording, f"drive_torque_{wheel}", rows, np.nan)
+    assert "gap" not in set(run(recording)["event"][400:])
 
 
 @pytest.mark.parametrize("imu", [False, True])
@@ -282,7 +308,8 @@ def test_whatever_comes_there_is_no_nan_without_an_event(rows, method):
             value = result[name]
             if math.isnan(value):
                 assert result.event in ("standstill", "gap"), (name, result.event)
-                assert not name.startswith(("adhesion", "soil", "net_traction", "vertical", "nis"))
+                assert result.event == "gap" or not name.startswith(("adhesion", "soil", "net_traction"))
+                assert not name.startswith(("vertical", "nis"))
             else:
                 assert math.isfinite(value), (name, value)
                 assert not name.endswith("_std") or value >= 0, (name, value)
