@@ -28,7 +28,7 @@ from terragrip.estimation.settings import Thresholds
 from terragrip.estimation.slip_only import (
     _against_travel,
     _dead_band,
-    _said,
+    _notes,
     slip_reference_in,
 )
 from terragrip.estimation.zero_slip import REMEDY, Zero
@@ -260,18 +260,18 @@ def test_where_slip_counts_from_is_said_of_wheel_and_drive() -> None:
     wheel = RIMS[0]
     drive = Rim(DRIVE, "wheel_based_speed", 0.8, 0.82, 0.03, 0.0)
     zero = Zero(0.975, 0.0025, 12)
-    assert _said(wheel, None, False) == []
-    assert _said(drive, None, True)[0].endswith(
+    assert _notes(wheel, None, False) == []
+    assert _notes(drive, None, True)[0].endswith(
         "slip counts from the speed that the machine reports, to about 3%."
     )
-    assert _said(wheel, zero, False) == [
+    assert _notes(wheel, zero, False) == [
         "Zero-slip radius of wheel rl in this log: 0.7800 ± 0.0020 m, " + REST + "."
     ]
-    assert _said(drive, zero, True) == [
+    assert _notes(drive, zero, True) == [
         "Zero-slip radius of the drive in this log: 0.7800 ± 0.0020 m, " + REST + ". Slip counts from there."
     ]
-    assert "(before calibration 0.8000 m)." in _said(drive, zero, False)[0]
-    assert _said(replace(drive, has_radius=False), replace(zero, doubt="why"), True) == [
+    assert "(before calibration 0.8000 m)." in _notes(drive, zero, False)[0]
+    assert _notes(replace(drive, has_radius=False), replace(zero, doubt="why"), True) == [
         "Zero-slip ground speed in this log: 0.9750 ± 0.0025 of the speed that the machine reports, from 12 windows of the "
         "lightest work; why."
     ]
