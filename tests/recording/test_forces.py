@@ -126,6 +126,26 @@ def test_what_slows_the_vehicle_and_not_the_rims_says_nothing_of_the_mass() -> N
     assert notes(columns, machine()) == []
 
 
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("delay", [0.4, 1.2])
+def test_a_receiver_that_filters_its_speed_accuses_neither_mass_nor_accelerometer(
+    delay: float, known: bool
+) -> None:
+    """Its speed changes less than the vehicle's."""
+    columns = drive()
+    if not known:
+        del columns["acceleration_x"]
+    speed = columns["ground_speed"]
+    for row in range(1, len(speed)):
+        speed[row] = speed[row - 1] + 0.05 / delay * (speed[row] - speed[row - 1])
+    assert notes(columns, machine()) == []
+
+
+def test_a_speed_in_kmh_accuses_not_the_accelerometer() -> None:
+    (note,) = notes(times(drive(), "ground_speed", 3.6), machine())
+    assert "ground_speed may be in km/h" in note
+
+
 @pytest.mark.parametrize(
     ("low", "high", "off"),
     [(0.9, 1.1, False), (1.4, 1.6, True), (1.2, 2.0, False), (0.5, 0.7, True), (-2.0, -1.0, True)],

@@ -3,7 +3,7 @@
 The wheels' thrust Σ M/r less the drawbar force is the mass times dv/dt + g sin(pitch), plus a resistance (physics.md 1), and an
 accelerometer along the vehicle reads the same acceleration. Within seconds the resistance changes by chance and the acceleration by
 command, which shows in the rims: their rate is the instrument of each regression, so neither noise nor a hit (which slows the vehicle,
-not the rims) bends it (R).
+not the rims) bends it. A receiver filters its speed: forces go with the accelerometer, and without one with the rims' rate (R).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _BLOCKS = 12  # for the jackknife
 _ALONE = 0.8  # share of the rims' change in one block: a single start has no scatter
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
-_ACCELERATION = 1.8  # an accelerometer's scale, with the effect of a late ground speed
+_ACCELERATION = 1.8  # against both the ground's and the rims' rate
 _FORCE = 1.3  # an uncalibrated torque, an estimated mass
 
 
@@ -93,8 +93,9 @@ class Courses:
         radii = {} if vehicle is None else driven_radii(vehicle)
         rim = calm(np.mean([radii.get(n[12:], 1.0) * at(n) for n in names], axis=0))
         speed = calm(at("ground_speed"))
-        rows = speed > _MOVING * quantile(speed, 0.95)
-        rows &= rim > (_MOVING * quantile(rim, 0.95) if vehicle is None else speed * 0.0)
+        if vehicle is None:  # without radii: as fast as the ground, on average
+            rim = rim * float(np.sum(speed * rim)) / max(float(np.sum(rim**2)), 1e-9)
+        rows = (speed > _MOVING * quantile(speed, 0.95)) & (rim > 0)
         if vehicle is not None:
             rows &= rim - speed < _SLIP * rim
         if rows.sum() * step < _LEAST:
@@ -125,12 +126,13 @@ class Courses:
             pull = quick(calm(at("drawbar_force")) / vehicle.mass)
         return cls(quick(rate), quick(change), shown, thrust, pull)
 
-    def slopes(self, y: Floats, *beside: Floats) -> list[Range] | None:
-        """y (n,) over the change of speed, and over each of ``beside``; None where the rims do not follow that change."""
+    def slopes(self, y: Floats, x: Floats, *beside: Floats) -> list[Range]:
+        """y (n,) over the acceleration x (n,) that the rims command, and over each of ``beside``; of what is not known 1."""
+        unknown = [_RIGHT] * (1 + len(beside))
         if not float(np.corrcoef(self.rims, self.change)[0, 1]) > _ALIKE:
-            return None
+            return unknown
         one = np.ones(len(y))
-        inside, outside = [self.rims, *beside, one], [self.change, *beside, one, y]
+        inside, outside = [self.rims, *beside, one], [x, *beside, one, y]
         block = np.arange(len(y)) * _BLOCKS // len(y)
         sums = np.array(
             [
@@ -140,10 +142,10 @@ class Courses:
         )
         whole = sums.sum(axis=0)
         if np.max(np.bincount(block, self.rims**2)) > _ALONE * np.sum(self.rims**2):
-            return None
+            return unknown
         tables = np.concatenate([whole[None], whole - sums])
         if not (np.linalg.matrix_rank(tables[..., :-1]) == len(inside)).all():
-            return None
+            return unknown
         fits = np.linalg.solve(tables[..., :-1], tables[..., -1:])[..., 0]
         errors = _SURE * np.sqrt((_BLOCKS - 1) * np.var(fits[1:], axis=0))
         return [Range(v, v - e, v + e) for v, e in zip(fits[0], errors, strict=True)][: 1 + len(beside)]
@@ -151,8 +153,12 @@ class Courses:
 
 def acceleration_warnings(courses: Courses | None) -> list[str]:
     """A sentence on an accelerometer of another sign or scale than the change of speed."""
-    found = courses.slopes(courses.shown) if courses is not None and courses.shown is not None else None
-    if not found or not found[0].is_off(_ACCELERATION):
+    if courses is None or courses.shown is None:
+        return []
+    found = [courses.slopes(courses.shown, own)[0] for own in (courses.change, courses.rims)]
+    if not all(
+        each.is_off(_ACCELERATION) for each in found
+    ):  # a receiver that filters changes less than the rims do
         return []
     flat = "acceleration_x is not the change of ground speed"
     if found[0].value < 0:
@@ -166,7 +172,10 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     """A sentence on torques, drawbar force and mass that contradict each other, and which of them may be wrong."""
     if courses is None or courses.thrust is None or courses.pull is None:
         return []
-    mass, pull = courses.slopes(courses.thrust, courses.pull) or (_RIGHT, _RIGHT)
+    change = (
+        courses.rims if courses.shown is None else courses.shown
+    )  # a receiver filters, and its speed is late
+    mass, pull = courses.slopes(courses.thrust, change, courses.pull)
     if not (mass.is_off(_FORCE) or pull.is_off(_FORCE)):
         return []
     causes = []

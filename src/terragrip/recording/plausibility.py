@@ -86,18 +86,20 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     sided, uneven = ([], []) if known is None else side_warnings(recording, known, shown)
     means = means_of(recording)
     thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
-    courses = Courses.of(recording, known)
-    moved = motion_warnings(recording, vehicle, means, thrusts) or acceleration_warnings(courses)
+    moved = motion_warnings(recording, vehicle, means, thrusts)
     unsigned = [] if known is None else sign_warnings(recording, known)
     copied = [] if known is None else copy_warnings(whole, known)
     speeds = [] if known is None or sided else _speed_warnings(recording, known)
+    placed = _position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds))
+    courses = None if speeds or sided or placed else Courses.of(recording, known)
+    moved = moved or acceleration_warnings(courses)
     notes = [
         *speeds,
         *sided,
         *uneven,
         *_drive_warnings(recording),
         *drift_warnings(recording),
-        *_position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds)),
+        *placed,
         *exchanged,
         *turn_rate_warnings(recording, None if exchanged else vehicle, track),
         *angles,
