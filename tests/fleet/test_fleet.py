@@ -460,6 +460,14 @@ def test_a_fleet_of_which_every_log_failed_goes_on(place: Path, ran: Ran) -> Non
         assert "0 estimated, 0 unchanged, 1 failed" in said
 
 
+def test_a_link_to_nothing_fails_alone(place: Path, ran: Ran) -> None:
+    (place / "logs/b/gone.csv").symlink_to(place / "nowhere.csv")
+    code, said, _ = ran(place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")
+    assert code == 0
+    assert "1 failed" in said
+    assert "gone.csv: no such file" in said
+
+
 def test_estimates_that_are_gone_or_cut_short_are_made_anew(place: Path, ran: Ran) -> None:
     out = place / "out"
     assert ran()[0] == 0

@@ -234,6 +234,7 @@ def test_a_log_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[: -path.stat().st_size // 3])
     cut = read_table(path)
     assert 0 < len(cut.columns["time"]) < whole
+    assert any("The file ends early: it has" in note for note in cut.notes)
     lines = write_log(tmp_path / "log.log", drive(1000, 10.0).frames).read_text().splitlines(keepends=True)
     (tmp_path / "log.log").write_text("".join(["@@@\n", *lines]))
     assert any("1 line has no frame: line 1 ('@@@')" in n for n in read_table(tmp_path / "log.log").notes)

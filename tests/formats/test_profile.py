@@ -383,3 +383,32 @@ def test_a_quotient_of_columns_that_never_stand_in_one_row_says_so(tmp_path: Pat
         InputError, match="channel drive_torque_l, over: p and w are never stamped together; log both"
     ):
         read(tmp_path / "log.csv", tmp_path / "p.yaml")
+
+
+@pytest.mark.parametrize(
+    "names", [["lon", "lat"], ["/fix.longitude", "/fix.latitude"], ["/platform.lon", "/platform.lat"]]
+)
+def test_a_longitude_before_its_latitude_is_refused(names: list[str]) -> None:
+    """At 50 degrees north it gave a wrong speed, and slip with it, without a word."""
+    source = {"derivative_of": names, "unit": "deg"}
+    with pytest.raises(InputError, match="names the longitude first; write the latitude first"):
+        Profile.from_dict({"channels": {"ground_speed": source}})
+    Profile.from_dict({"channels": {"ground_speed": {**source, "derivative_of": names[::-1]}}})
+
+
+def test_a_frame_is_a_log_too() -> None:
+    frame = pd.DataFrame({"t": [0.0, 0.1, 0.2], "kmh": [3.6, 7.2, 7.2], "n": [5.0, 6.0, 6.0]})
+    units = {"ground_speed": {"from": "kmh", "unit": "km/h"}, "wheel_speed_l": "n"}
+    profile = Profile.from_dict({"time": {"from": "t"}, "channels": units})
+    np.testing.assert_allclose(read(frame, profile)["ground_speed"], [1.0, 2.0, 2.0])
+    own = frame.rename(columns={"kmh": "ground_speed", "n": "wheel_speed_l", "t": "time"})
+    np.testing.assert_array_equal(read(own).time, own["time"])
+    np.testing.assert_array_equal(read(own.set_index("time")).time, own["time"])
+    dated = own.drop(columns="time").set_index(
+        pd.date_range("2026-05-11 08:00", periods=3, freq="100ms", tz="Europe/Berlin")
+    )
+    assert read(dated).start == pd.Timestamp("2026-05-11 06:00", tz="UTC").timestamp()
+    np.testing.assert_allclose(read(dated).time, own["time"])
+    assert "time" not in dated.columns
+    with pytest.raises(InputError, match="column kmh: is missing"):
+        read(own, profile)

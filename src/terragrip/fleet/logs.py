@@ -77,7 +77,7 @@ def on_disk(paths: Iterable[Path], output: str) -> list[tuple[str, int]]:
         whole = Path(os.path.abspath(path))
         if (own in whole.parents and not is_remote(output)) or (whole.is_dir() and not is_bag(whole)):
             continue
-        if not whole.exists():
+        if not whole.exists() and not whole.is_symlink():  # a link to nothing is a log that fails
             raise InputError("no such file", file=path, hint="check the path")
         inside = [whole] if whole.is_file() else [one for one in whole.rglob("*") if one.is_file()]
         kept.append((str(whole), sum(one.stat().st_size for one in inside)))

@@ -88,6 +88,13 @@ class Source(Part):
             raise Fault("serves over only", "leave it out", ("over_minimum",))
         if self.forward is not None and len(self.derivative_of or ()) != 2:
             raise Fault("needs derivative_of two columns, x and y", "leave it out", ("forward",))
+        last = [name.lower().rpartition(".")[2] for name in self.derivative_of or ()]
+        if self.is_geographic and "lon" in last[0] and "lat" in last[1] and "lon" not in last[1]:
+            raise Fault(
+                "names the longitude first",
+                "write the latitude first, then the longitude",
+                ("derivative_of",),
+            )
         if self.window <= 0:
             raise Fault("is not a span of time", "write e.g. '0.5 s'", ("window",))
         return self

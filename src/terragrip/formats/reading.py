@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +18,14 @@ from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
 from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
-from terragrip.recording.columns import seconds, start_of
+from terragrip.recording.columns import columns_of, seconds, start_of
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
 
 
 def read(
-    path: PathLike | Sequence[PathLike],
+    path: PathLike | Sequence[PathLike] | Any,
     profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None = None,
     *,
     dbc: PathLike | Sequence[PathLike] = (),
@@ -36,12 +37,17 @@ def read(
     that comes with Terragrip, the profile defines the columns. ``dbc``: the DBC files of a CAN log, beside the
     profile's own.
 
+    A pandas or polars frame, an Arrow table or a mapping of arrays in place of a path is a log, too.
+
     Several paths are sources of one drive. Each gives its channels; where several have one, the first source counts.
     A list of profiles has one for each, None for a source with our names. Clocks are aligned by their stamps where both
     count from 1970, then by the correlation of the speeds, and the notes report by how much.
 
     Raises InputError with file, column, row and hint if the log is unusable.
     """
+    if isinstance(path, Mapping) or hasattr(path, "columns"):
+        columns = columns_of(path, None)
+        return recording_of(LogTable(tuple(columns), columns), _loaded(profile))
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
         from terragrip.formats.sources import merged

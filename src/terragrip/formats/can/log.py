@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -48,9 +49,15 @@ def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
         open(path, "rb") as stream,
         as_far_as_it_goes(path, "BLF log", notes, needed("can.io.blf", "a BLF log").BLFParseError) as seen,
     ):
-        for frame in frames_of(blf_reader(can.BLFReader)(stream)):
+        log = blf_reader(can.BLFReader)(stream)
+        for frame in frames_of(log):
             frames.add(*frame)
             seen.messages += 1
+        size = os.path.getsize(path)
+        if size < log.file_size:
+            notes.append(
+                f"The file ends early: it has {size} bytes of the {log.file_size} that its head states."
+            )
     return finished(frames, path, notes, databases)
 
 
