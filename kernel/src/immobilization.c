@@ -116,7 +116,8 @@ static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l,
 
 /* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing.
  * Time counts from when the vehicle may stand, for an estimate comes after the fact; stuck is what surely does not go freely. What surely
- * goes against its rims slides, or still goes the way it came: it does not stand. */
+ * goes against its rims slides, or still goes the way it came: it does not stand. Of a vehicle that was warned of it suffices that it may
+ * stand; else the estimate itself says so, for a start is as slow. */
 static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
@@ -136,7 +137,7 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     const int32_t turning = w->rim > 3 * still && l->fastest > 3 * still, begun = w->turned > TG_HALF_TURN * e->constants.mean_radius;
     const int32_t may_stand = tgi_fabs(l->travel) - unsure < hardly;
     w->spinning = turning ? count_seconds(w->spinning, dt, may_stand, 1, s->stuck_duration) : 0;
-    w->held = turning && may_stand && l->travel < hardly && tgi_max(l->travel, 0) + unsure < freely;
+    w->held = turning && may_stand && (w->sinking || l->travel < hardly) && tgi_max(l->travel, 0) + unsure < freely;
     const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
     w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && tgi_fabs(l->travel) < freely));
     if (w->stuck) w->sinking = 0;

@@ -119,3 +119,17 @@ def test_a_machine_is_stuck_until_it_comes_free_or_is_not_seen_for_long(
     assert 0.125 * first == pytest.approx(max(0.5, np.pi * RADIUS), abs=0.13)
     assert set(events[first:]) == {"stuck"}
     assert watch.update(row(2.0 + after, travel)) == event
+
+
+@pytest.mark.parametrize("warned", [True, False])
+def test_after_a_warning_a_vehicle_that_may_stand_is_stuck(warned: bool) -> None:
+    """.15 ± .1 of the rims' speed is not certainly under a tenth of it: a stop after a warning, else perhaps a start."""
+    limits = watch_limits(RADIUS)
+    watch = Watch(limits if warned else limits | {"warn": 99.0}, 1.0, RADIUS)
+    events = []
+    for k in range(60):
+        slip = min(0.05 + 0.3 * max(0.1 * k - 3.0, 0.0), 0.85)
+        row = Row(0.1 * k, slip, 0.02, 1.0, 0.3, 0.3, 0.1, 1.0, 1 - slip, travel_deviation=0.1)
+        events.append(watch.update(row))
+    assert ("immobilization" in events) == warned
+    assert (events[-1] == "stuck") == warned

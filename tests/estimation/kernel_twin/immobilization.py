@@ -278,7 +278,8 @@ class Watch:
         may_stand = abs(row.travel) - unsure < hardly
         spinning = min(max(self.spinning + (dt if may_stand else -dt), 0.0), limits["stuck_duration"])
         self.spinning = spinning if turning else 0.0
-        self.held = turning and may_stand and row.travel < hardly and max(row.travel, 0.0) + unsure < freely
+        likely = may_stand and (self.sinking or row.travel < hardly)
+        self.held = turning and likely and max(row.travel, 0.0) + unsure < freely
         sure = (
             self.held
             and self.spinning + dt / 2 >= limits["stuck_duration"]
