@@ -412,3 +412,5 @@ def test_a_frame_is_a_log_too() -> None:
     assert "time" not in dated.columns
     with pytest.raises(InputError, match="column kmh: is missing"):
         read(own, profile)
+    with pytest.raises(InputError, match="several profiles for one table"):
+        read(own, [profile, profile])

@@ -46,8 +46,7 @@ def read(
     Raises InputError with file, column, row and hint if the log is unusable.
     """
     if isinstance(path, Mapping) or hasattr(path, "columns"):
-        columns = columns_of(path, None)
-        return recording_of(LogTable(tuple(columns), columns), _loaded(profile))
+        return _of_frame(path, profile)
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
         from terragrip.formats.sources import merged
@@ -63,6 +62,13 @@ def read(
     if chosen is not None:
         return recording_of(read_table(path, chosen.wants, (*databases, *chosen.dbc)), chosen)
     return recording_of(read_table(path, is_own, databases), None)
+
+
+def _of_frame(frame: Any, profile: Any) -> Recording:
+    if isinstance(profile, list | tuple):
+        raise InputError("there are several profiles for one table", hint="give one profile")
+    columns = columns_of(frame, None)
+    return recording_of(LogTable(tuple(columns), columns), _loaded(profile))
 
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
