@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.estimation.calibration.result import Evidence, Unknown
@@ -53,6 +54,7 @@ _DELAY = 0.1  # s, SD of the ground speed's delay: while a machine speeds up it 
 _WANDERS = 0.2  # s, by which it may differ from window to window: a receiver's interval, and rates are of four seconds
 _SOILS = 0.35  # SD of ln C from one stretch without a label to the next,
 _STRETCH, _STRETCHES = 20.0, 40  # m that it lasts at least, and how many there are at most
+_PARTS = 4  # of the way without labels, that may be soils of their own: what their curves change is in the interval
 _LEAST_ADHESION = 0.01
 _ROUNDS = 50
 _TORQUE_ZERO = 0.02  # prior of a torque zero, over r F, where the vehicle states none
@@ -92,21 +94,52 @@ def rolling_radii(
             f"{distance:.0f} m of straight steady passes at zero pull, and {_LEAST_DISTANCE:.0f} m are needed"
         )
         return Unknown("wheel_radius", why)
-    soils = sorted(set(windows.soil[free]))
-    code = np.array([soils.index(label) if label in soils else -1 for label in windows.soil])
-    driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
-    most = np.array([_most(driving[passes & (code == j)]) for j in range(len(soils))])
-    used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
-    if not used[free].any():
+    fits = [
+        _by_soils(windows, vehicle, adhesion, passes, free, soil, block) for soil in _possible_soils(windows)
+    ]
+    if fits[0] is None:
         return Unknown("wheel_radius", "no zero-pull window has a plausible adhesion")
-    scale, own, steepness, stretches = _fit(windows, vehicle, adhesion, code, most, used, block)
+    scale, own, typical, stretches = fits[0]
+    for other in fits[1:]:
+        own = own + (0.0 if other is None else np.log(other[0] / scale) ** 2)
     radius = vehicle.wheel_radius * scale
-    typical = float(np.average(steepness[code[free]]))
     variance = own + _considered(vehicle, typical)
     rolled = slip(windows.wheel_speed[free], windows.hub_speed[free], radius, standstill_speed=0.0)
     rests_on = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
     factor = float(stdtrit(max(1.0, stretches - 1), 0.975))
     return Rolling(radius, np.sqrt(variance), factor, float(np.mean(rolled)), rests_on)
+
+
+def _possible_soils(windows: Windows) -> list[npt.NDArray[np.object_]]:
+    """The labels (n,) of the windows; where some have none also with one for each part of the way: a soil may last as long."""
+    bare = windows.soil == ""
+    if not bare.any():
+        return [windows.soil]
+    way = np.maximum(np.nan_to_num(windows.position[:, 0]), 0.0)
+    part = np.minimum(_PARTS * way / max(float(way.max()), 1e-9), _PARTS - 1).astype(np.intp)
+    return [windows.soil, np.where(bare, part.astype(str).astype(object), windows.soil)]
+
+
+def _by_soils(
+    windows: Windows,
+    vehicle: Vehicle,
+    adhesion: Floats,
+    passes: Bools,
+    free: Bools,
+    soil: npt.NDArray[np.object_],
+    block: Ints,
+) -> tuple[Floats, Floats, float, float] | None:
+    """The scale of the radii (w,), its variance, the steepness at zero pull, and on how many blocks these rest, by a curve for each
+    ``soil`` (n,); None without a window at zero pull."""
+    soils = sorted(set(soil[free]))
+    code = np.array([soils.index(label) if label in soils else -1 for label in soil])
+    driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
+    most = np.array([_most(driving[passes & (code == j)]) for j in range(len(soils))])
+    used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
+    if not used[free].any():
+        return None
+    scale, own, steepness, stretches = _fit(windows, vehicle, adhesion, code, most, used, block)
+    return scale, own, float(np.average(steepness[code[free]])), stretches
 
 
 def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:
