@@ -43,7 +43,7 @@ LIMITS = {
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
     "torques": "_LEAST",
-    "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _SURE _ALIKE _ACCELERATION _FORCE",
+    "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
     "rolling": "_PULLING _MOST",
