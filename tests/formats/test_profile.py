@@ -414,3 +414,23 @@ def test_a_frame_is_a_log_too() -> None:
         read(own, profile)
     with pytest.raises(InputError, match="several profiles for one table"):
         read(own, [profile, profile])
+
+
+def test_a_pattern_without_a_column_names_the_channel_and_not_what_it_leaves_out(
+    foreign: pd.DataFrame,
+) -> None:
+    """The message of ros2-4wd led to the wheel odometry, which the profile leaves out since it hides slip."""
+    speed = {"from": "*visual*.linear.x", "else": {"from": "*gnss*.speed"}}
+    log = foreign.rename(columns={"kmh": "/odom.linear.x"})
+    profile = Profile.from_dict({"time": {"from": "stamp"}, "channels": {"ground_speed": speed}})
+    with pytest.raises(InputError, match="for ground_speed, and so are its alternatives") as refused:
+        profile.apply(log)
+    assert "/odom" not in str(refused.value)
+
+
+def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None:
+    profile = Profile.from_dict({"channels": {"ground_speed": {"from": "kmh", "unit": "km/h"}}})
+    with pytest.raises(
+        InputError, match=r"column time: is missing; name it in the profile: 'time: \{from: \.\.\.\}'"
+    ):
+        profile.apply(foreign)

@@ -45,7 +45,8 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         else:
             every = [column for source in origin.chain for column in source.columns]
             lacking = next((c for c in every if not matching(c, log.columns)), every[0])
-            raise _missing(lacking, log, others=len(origin.chain) > 1 or len(origin.candidates) > 1)
+            several = len(origin.chain) > 1 or len(origin.candidates) > 1
+            raise _missing(lacking, log, several_for=name if several else None)
     if absent and not partial:
         notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")
     time, rows = profile.time, profile.rows
@@ -104,11 +105,19 @@ def _holds(log: LogTable, column: str) -> bool:
     return values.dtype.kind != "f" or bool(np.isfinite(values).any())
 
 
-def _missing(column: str, log: LogTable, *, others: bool = False) -> InputError:
-    close = nearest(column, log.names)
+def _missing(column: str, log: LogTable, *, several_for: str | None = None) -> InputError:
+    close = (
+        nearest(column, log.names) if "*" not in column else None
+    )  # a pattern is near to what it was made to leave out
     hint = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
     hint = how_to_pivot(log.names) or hint
     problem = "is missing, but the profile names it"
-    if others:
-        problem += ", and so are its alternatives"
+    if several_for is not None:
+        problem += f" for {several_for}, and so are its alternatives"
+        if "*" in column:
+            hint = (
+                f"name the log's own column for {several_for} in a profile ('terragrip inspect' proposes one)"
+            )
+    if column == TIME:
+        problem, hint = "is missing", f"name it in the profile: 'time: {{from: ...}}'; {hint}"
     return InputError(problem, file=log.source, place=f"column {column}", hint=hint)

@@ -12,6 +12,8 @@ from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
 from terragrip.live.pulse import Pulse
+from terragrip.recording.clock import clock_text
+from terragrip.recording.columns import SINCE_1970
 
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
@@ -146,7 +148,8 @@ class Statistics:
     def summary(self) -> str:
         """The run in a few lines of text."""
         core = self._core
-        lines = [f"{core.rows} rows estimated" + (f", up to {core.time:.6g} s" if core.rows else "")]
+        last = clock_text(round(core.time, 3)) if core.time > SINCE_1970 else f"{core.time:.6g} s"
+        lines = [f"{core.rows} rows estimated" + (f", up to {last}" if core.rows else "")]
         for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):
             by = {name: mine[fate] for name, mine in core.counts.by_channel.items() if mine[fate]}
             if by:
