@@ -72,3 +72,12 @@ def test_rates_that_differ_give_the_same_gains(drive: Make, vehicle: Vehicle) ->
     for wheel in vehicle.wheels:
         name = f"drive_torque_gain {wheel}"
         assert part[name].value == pytest.approx(whole[name].value, abs=3e-3)
+
+
+def test_a_note_names_the_log_that_it_is_about(drive: Make, vehicle: Vehicle) -> None:
+    """Of several logs by one profile one may be in other units; a note that all share names none."""
+    right, other = drive(seed=1, standing=10), drive(seed=2, standing=10)
+    other = other.with_channels(ground_speed=3.6 * other["ground_speed"])
+    (note,) = [note for note in calibrate([right, other], vehicle).notes if "km/h" in note]
+    assert note.startswith("log 2: ")
+    assert not any(note.startswith("log ") for note in calibrate([other, other], vehicle).notes)

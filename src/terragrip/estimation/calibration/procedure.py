@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def calibrate(
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
-    doubts = tuple(dict.fromkeys(remarks for log in logs for remarks in unit_warnings(log, vehicle)))
+    doubts = _doubts(logs, sources, vehicle)
     if all(speeds_alone(log.channels, vehicle) for log in logs):
         return replace(calibrate_radii(logs, vehicle, sources, light), notes=doubts)
     for log in logs:
@@ -130,6 +131,17 @@ def calibrate(
     unknown += turned_unseen(corrected, vehicle, [q.name for q in quantities])
     doubts += tuple(gains_by_axle(shared, vehicle))
     return Calibration(tuple(quantities), tuple(unknown), _left(quantities, vehicle), doubts)
+
+
+def _doubts(logs: Sequence[Recording], sources: Sequence[str], vehicle: Vehicle) -> tuple[str, ...]:
+    """What the motion contradicts, with the logs that do where not all of them do."""
+    found: dict[str, list[str]] = {}
+    for log, source in zip(logs, sources, strict=True):
+        for note in unit_warnings(log, vehicle):
+            found.setdefault(note, []).append(Path(source).name)
+    return tuple(
+        note if len(names) == len(logs) else f"{', '.join(names)}: {note}" for note, names in found.items()
+    )
 
 
 def _zeros(
