@@ -240,7 +240,7 @@ typedef enum {
     TG_EVENT_OUTLIER = 1,    /* a value far from what the filter or its own past expects, given less weight */
     TG_EVENT_STANDSTILL = 2, /* slip and efficiency are undefined (NaN); adhesion and resistance are held */
     TG_EVENT_GAP = 3,        /* nothing measured for longer than `gap`, or nothing yet: values before the first are NaN; or a wheel's
-                              * speed or drive torque silent for longer while others come: what depends on it is NaN */
+                              * speed, a drive torque or the drawbar force silent for longer while others come: what depends on it is NaN */
     TG_EVENT_IMMOBILIZATION = 4, /* a warning: the wheels dig, the vehicle is about to get stuck */
     TG_EVENT_STUCK = 5,      /* the wheels turn, the vehicle hardly moves */
     TG_EVENT_PUSH = 6,       /* something pushes from behind while the wheels pull: a tool that runs up */

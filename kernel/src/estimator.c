@@ -193,15 +193,17 @@ static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
     return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
 }
 
-/* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured: the thrust of such a wheel is
- * unknown, so neither it nor the soil's resistance is told by the rest, and of a wheel without a speed there is no slip. */
+/* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured, and whether any is, or a
+ * drawbar force that was measured before: the thrust or pull that is unknown then and the soil's resistance look alike. Of a wheel
+ * without a speed there is no slip. */
 static int32_t listen(tg_estimator *e, double time)
 {
     const tg_settings *s = &e->settings;
-    int32_t silent = 0;
+    const int32_t exempt = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap;
+    int32_t silent = !exempt && e->drawbar.count > 0 && is_silent(e, &e->drawbar, time);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const int32_t speed = is_silent(e, &e->wheel[i], time), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
-        e->scene.silent[i] = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap ? 0 : speed ? 2 : (tg_real)torque;
+        e->scene.silent[i] = exempt ? 0 : speed ? 2 : (tg_real)torque;
         silent |= e->scene.silent[i] > 0;
     }
     return silent;

@@ -189,8 +189,8 @@ def test_before_the_first_speed_there_is_a_gap():
     assert np.isfinite(estimates["slip_rr"][100:]).all()
 
 
-@pytest.mark.parametrize("lost", ["wheel_speed_fl", "drive_torque_fl"])
-def test_a_wheel_that_falls_silent_is_no_slip_and_leaves_no_adhesion(lost):
+@pytest.mark.parametrize("lost", ["wheel_speed_fl", "drive_torque_fl", "drawbar_force"])
+def test_a_wheel_or_drawbar_that_falls_silent_leaves_no_adhesion_and_no_slip_of_that_wheel(lost):
     """It came out as slip .98 ± .01, "stuck", and an adhesion of -.6 ± .5; the soil's resistance was held 7 SD off."""
     base = drive(40.0)
     silent = (base.recording.time > 10) & (base.recording.time < 30)
@@ -201,7 +201,8 @@ def test_a_wheel_that_falls_silent_is_no_slip_and_leaves_no_adhesion(lost):
     for name in [*unknown, *["slip_fl"] * lost.startswith("wheel")]:
         assert np.isnan(estimates[name][deep]).all(), name
         assert np.isnan(estimates[f"{name}_std"][deep]).all(), name
-    assert np.abs(estimates["slip_rr"] - base.truth["slip_rr"])[deep].mean() < 0.02
+    off = np.abs(estimates["slip_rr"] - base.truth["slip_rr"])
+    assert np.mean((off < 1.96 * estimates["slip_rr_std"])[deep]) > 0.9
     for name in ("adhesion_rr", "adhesion_fl", "slip_fl", "soil_resistance"):
         off, sure = np.abs(estimates[name] - base.truth[name])[3200:], estimates[f"{name}_std"][3200:]
         assert np.mean(off < 1.96 * sure) > 0.8, name

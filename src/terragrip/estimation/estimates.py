@@ -57,8 +57,8 @@ class Estimates:
     (physics.md 6). ``curve_a`` (vehicle, and of each wheel) is the scale of the adhesion curve known so far
     (docs/kernel.md). ``warning`` is the score of the warning of immobilization, ``warning_<sign>`` its signs in points,
     ``warning_usual_slip`` the usual slip (docs/events.md). A value is NaN only where ``event`` gives the reason: slip and
-    efficiency at ``standstill``, speeds in a ``gap`` before the first measurement, and in a ``gap`` of one wheel's speed
-    or drive torque alone all that depends on it.
+    efficiency at ``standstill``, speeds in a ``gap`` before the first measurement, and in a ``gap`` of one wheel's speed,
+    drive torque or the drawbar force alone all that depends on it.
     """
 
     time: Floats

@@ -131,8 +131,8 @@ def _gap(estimates: Estimates, rows: Ints) -> str:
     gap = estimates.about.get("settings", {}).get("gap") or watch_limits()["gap"]
     if "soil_resistance" in estimates.columns and np.isnan(estimates["soil_resistance"][rows]).all():
         return (
-            f"A wheel's speed or drive torque did not come for more than {gap:g} s, or had not come yet: adhesion, net traction, "
-            "efficiency and soil resistance are unknown, and so is the slip of a wheel without a speed."
+            f"A wheel's speed, a drive torque or the drawbar force did not come for more than {gap:g} s, or had not come yet: adhesion, "
+            "net traction, efficiency and soil resistance are unknown, and so is the slip of a wheel without a speed."
         )
     return (
         f"No wheel speed or ground speed came for more than {gap:g} s, or none had come yet: the motion starts again; "
