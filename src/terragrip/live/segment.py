@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.files import sync
-from terragrip.live.core import Ground, Output, Refusal, Row, Values
+from terragrip.live.core import Ground, Output, Refusal, Row
 from terragrip.live.event import Event
 
 if TYPE_CHECKING:
@@ -23,30 +24,43 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
 
+_CODES = {event: code for code, event in enumerate(EVENTS)}
 RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
 
 
 @dataclass(slots=True)
 class Segment:
-    """What came out of the core since the last segment was closed."""
+    """What came out of the core since the last segment was closed. Rows lie flat: made to columns of a table in a moment."""
 
     number: int
     size: int = 0  # outputs in it: rows, events, refusals and states of the ground
-    rows: list[tuple[float, float, str, bytes, Values]] = field(default_factory=list)
-    """Time and arrival [s] of each row, its event, its estimate's numbers packed, and what was measured."""
+    time: array[float] = field(default_factory=lambda: array("d"))
+    arrival: array[float] = field(default_factory=lambda: array("d"))
+    codes: bytearray = field(default_factory=bytearray)  # of the rows' events
+    estimates: bytearray = field(default_factory=bytearray)
+    measured: dict[tuple[str, ...], tuple[array[int], array[float]]] = field(default_factory=dict)
+    """Of the channels that came together, the places of their rows, and their values one behind the other."""
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ground: list[Ground] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self.time)
 
     def add(self, output: Output) -> None:
         """Take one output of the core."""
         self.size += 1
         if isinstance(output, Row):
-            estimate = output.estimate
-            self.rows.append((estimate.time, output.arrival, estimate.event, estimate.packed, output.values))
+            estimate, names = output.estimate, tuple(output.values)
+            if names not in self.measured:
+                self.measured[names] = array("q"), array("d")
+            places, values = self.measured[names]
+            places.append(len(self))
+            values.extend(output.values.values())
+            self.time.append(estimate.time)
+            self.arrival.append(output.arrival)
+            self.codes.append(_CODES[estimate.event])
+            self.estimates += estimate.packed
         elif isinstance(output, Event):
             self.events.append(output)
         elif isinstance(output, Ground):
@@ -58,8 +72,12 @@ class Segment:
         """What was measured, a column (n,) each; NaN where a row has none."""
         import numpy as np
 
-        names = dict.fromkeys(name for *_, values in self.rows for name in values)
-        return {name: np.array([values.get(name, np.nan) for *_, values in self.rows]) for name in names}
+        result = {name: np.full(len(self), np.nan) for names in self.measured for name in names}
+        for names, (places, values) in self.measured.items():
+            table = np.frombuffer(values).reshape(-1, len(names))
+            for name, column in zip(names, table.T, strict=True):
+                result[name][np.frombuffer(places, dtype=np.int64)] = column
+        return result
 
     def write(self, folder: Path, estimator: TractionEstimator | None) -> None:
         """Write the segment's files; raises OSError."""
@@ -91,8 +109,8 @@ class Segment:
         import numpy as np
         import pyarrow as pa
 
-        stamps = np.array([row[:2] for row in self.rows])
-        columns = {"time": stamps[:, 0], "arrival": stamps[:, 1], **self.channels()}
+        stamps = {"time": np.frombuffer(self.time), "arrival": np.frombuffer(self.arrival)}
+        columns = {**stamps, **self.channels()}
         return pa.table({name: floats(column) for name, column in columns.items()})
 
     def to_estimates(self, estimator: TractionEstimator) -> Estimates:
@@ -104,16 +122,14 @@ class Segment:
         from terragrip.estimation.forward import CARRIED
         from terragrip.estimation.provenance import about_run
 
-        table = np.frombuffer(b"".join(row[3] for row in self.rows)).reshape(len(self), -1)
+        table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}
         measured = self.channels()
         columns |= {name: measured[name] for name in CARRIED if name in measured}
         about = about_run(estimator, {"source": None, "sha256": None}, smooth=False)
         if isinstance(estimator, EngineEstimator):
             about["driveline"] = estimator.machine.to_dict()
-        time = np.array([row[0] for row in self.rows])
-        codes = np.array([EVENTS.index(row[2]) for row in self.rows], dtype=np.uint8)
-        return Estimates(time, columns, codes, {}, about)
+        return Estimates(np.array(self.time), columns, np.array(self.codes, dtype=np.uint8), {}, about)
 
 
 @contextmanager
