@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
-FORMAT = 4  # of `Core.state`
+FORMAT = 3  # of `Core.state`
 _WARNINGS = {
     "immobilization": "about to dig in",
     "stuck": "stuck",

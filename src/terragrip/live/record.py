@@ -101,7 +101,8 @@ class Recorder:
             else:
                 self.segment, torn = segment, reading.size - reading.good
                 if reading.good:
-                    ahead = WriteAhead(wal_path(self.folder, segment.number), append_at=reading.good)
+                    path = wal_path(self.folder, segment.number)
+                    ahead = WriteAhead(path, append_at=reading.good, names=reading.names)
         self._ahead = self._open_wal() if ahead is None else ahead
         if self.core.rows:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
