@@ -3,7 +3,7 @@
     python benchmarks/bench_warning.py [--families development held-out second-plant snow] [--stops 40] [--hours 2] [--rates 100 10]
                                        [--workers 2] [--speeds-alone] [--write]
 
-Closing figures: --families held-out second-plant --stops 200 --hours 4 --seed 680000 --write.
+Closing figures: --families held-out second-plant --stops 200 --hours 4 --seed 690000 --write.
 development and held-out: terragrip.simulation.families;
 second-plant: MuJoCo (benchmarks/second_plant), held out as a whole. A digging drive goes steadily into ground that cannot bear what is
 asked. Its stop is when, by the truth, the ground speed first stays under STOPPED of the rim's while wheels turn. A warning counts
