@@ -142,7 +142,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     settling pass = {tau, 0, 0};
     int32_t n = s->machine.wheels, seen = 0;
     const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
-    tg_real fastest = 0, soonest = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, &pass);
+    tg_real fastest = 0, soonest = 0, forward = 0, backward = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, &pass);
     tg_real course = soon(&e->soon_ground, seen_ground, row->time, tau, s->noise[TG_GROUND_SPEED], s->standstill_speed);
     for (int32_t i = 0; i < n; i++) {
         const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
@@ -151,6 +151,8 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
         if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
         if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
+        if (now > forward) forward = now;
+        if (-now > backward) backward = -now;
         seen++;
         rim += now;
         if (tgi_fabs(w) > fastest) fastest = tgi_fabs(w);
@@ -167,7 +169,10 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold + 2 * s->noise[TG_GROUND_SPEED];
 
     const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed counts less than the wheels */
-    tg_real motion = (rim + trust * course) / (1 + trust);
+    const int32_t torn =
+        forward > threshold && backward > threshold && tgi_fabs(course) > threshold + 2 * s->noise[TG_GROUND_SPEED];
+    /* Wheels that turn against others brake, or swing in the air. */
+    tg_real motion = torn ? course : (rim + trust * course) / (1 + trust);
     if (e->standing || tgi_fabs(motion) < s->standstill_speed) return 0;
     int32_t direction = motion > 0 ? 1 : -1, turned = direction != e->direction;
     e->direction = direction;

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from tests.estimation.drives import BEARING, INERTIA, RADIUS, WHEELS, drive, robot
 
 from terragrip.estimation import estimate
 from terragrip.estimation.engine import EVENTS
@@ -46,3 +49,22 @@ def test_before_the_first_motion_adhesion_is_what_the_torques_say():
     for wheel in drive.vehicle.wheels:
         assert np.abs(found[f"adhesion_{wheel}"][rest]).max() < 0.05
         assert found[f"adhesion_{wheel}_std"][rest].min() > 0.25
+
+
+def test_wheels_that_swing_in_the_air_do_not_turn_the_vehicle_round():
+    """The rear wheels hang over a hole and swing under their speed control, backward as far as forward: the ground speed tells."""
+    made = drive(16.0)
+    time, channels = made.recording.time, dict(made.recording.channels)
+    swings = (time > 10) & (time < 14)
+    rim, rate = 4.0 * np.sin(2 * np.pi * (time - 10) / 0.4), 1 / RADIUS
+    torque = INERTIA * np.gradient(rim * rate, time) + BEARING * rim * rate
+    for wheel in WHEELS[2:]:
+        speed, pulled = channels[f"wheel_speed_{wheel}"], channels[f"drive_torque_{wheel}"]
+        channels[f"wheel_speed_{wheel}"] = np.where(swings, rim * rate, speed)
+        channels[f"drive_torque_{wheel}"] = np.where(swings, torque, pulled)
+    thrust = made.truth["adhesion_rl"] * made.truth["vertical_load_rear"]
+    channels["drawbar_force"] = channels["drawbar_force"] - np.where(swings, thrust, 0)
+    channels["ground_speed"] = np.where(np.arange(len(time)) % 10 == 0, channels["ground_speed"], np.nan)
+    found = estimate(replace(made.recording, channels=channels), robot())
+    assert np.abs(found["ground_speed"] - made.truth["ground_speed"])[swings].max() < 0.3
+    assert np.abs(found["adhesion_fl"] - made.truth["adhesion_fl"])[swings].max() < 0.3
