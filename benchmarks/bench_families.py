@@ -161,6 +161,8 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
             if "drawbar_force" not in seen.recording.channels:  # what that drive tows is in no channel
                 continue
             drive = draw(kind, seed, rate=VIEW_RATE, task="healthy", duration=CALIBRATING)
+            if drive.vehicle.mass != vehicle.mass:  # it tipped over there, and another was drawn
+                continue
             vehicle = calibrate(drive.recording, vehicle).apply(vehicle)
         elif view == "no accelerometer":
             if "acceleration_x" not in seen.recording.channels:
