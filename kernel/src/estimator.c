@@ -186,29 +186,6 @@ static int32_t wheels_are_silent(const tg_estimator *e, double time)
     return 1;
 }
 
-/* Not measured for longer than a gap and ten of its intervals (of at most half a gap), or not yet. */
-static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
-{
-    const tg_real gap = e->settings.gap, most = gap / 2;
-    return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
-}
-
-/* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured, and whether any is, or a
- * drawbar force that was measured before: the thrust or pull that is unknown then and the soil's resistance look alike. Of a wheel
- * without a speed there is no slip. */
-static int32_t listen(tg_estimator *e, double time)
-{
-    const tg_settings *s = &e->settings;
-    const int32_t exempt = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap;
-    int32_t silent = !exempt && e->drawbar.count > 0 && is_silent(e, &e->drawbar, time);
-    for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const int32_t speed = is_silent(e, &e->wheel[i], time), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
-        e->scene.silent[i] = exempt ? 0 : speed ? 2 : (tg_real)torque;
-        silent |= e->scene.silent[i] > 0;
-    }
-    return silent;
-}
-
 #define TG_PEAK ((tg_real)2.4674) /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
 
 /* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. */
@@ -234,7 +211,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
-    e->scene.unheard = (tg_real)listen(e, out->time);
+    tgi_find_silent(e, out->time);
     e->scene.roughness = e->roughness.wander;
     e->scene.weight = drive->mass * e->settings.machine.gravity + drive->hitch_load;
     e->scene.unseen_load = tgi_unseen_load(e);
@@ -267,7 +244,7 @@ static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
     for (int32_t i = 0; i < e->settings.machine.wheels; i++)
         if (e->wheel[i].count > 0 && e->wheel[i].time == row->time) e->unseen &= ~1;
     if (e->ground.count > 0 && e->ground.time == row->time) e->unseen &= ~2;
-    return e->unseen != 0 || e->scene.unheard > 0 || wheels_are_silent(e, row->time);
+    return e->unseen != 0 || e->scene.any_silent > 0 || wheels_are_silent(e, row->time);
 }
 
 /* What blinds comes first, then what stops the vehicle. */

@@ -49,7 +49,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real chatter[8]; /* wheel: variance of an adhesion that alternates from sample to sample, see inputs.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */
-    tg_real unheard; /* whether any is */
+    tg_real any_silent; /* whether any is, or the drawbar force */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
     tg_real roughness; /* mean square of the variation of rho_s over uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
@@ -269,6 +269,7 @@ tg_real tgi_hitch_spread(const tg_estimator *e);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
+void tgi_find_silent(tg_estimator *e, double time);
 void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);

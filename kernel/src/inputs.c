@@ -215,3 +215,26 @@ void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u)
     u->mass = e->mass.count > 0 ? drive->mass : 0;
     u->hitch_load = drive->hitch_load;
 }
+
+/* Not measured for longer than a gap and ten of its intervals (of at most half a gap), or not yet. */
+static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
+{
+    const tg_real gap = e->settings.gap, most = gap / 2;
+    return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
+}
+
+/* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured, and whether any is, or a
+ * drawbar force that was measured before: the thrust or pull that is unknown then and the soil's resistance look alike. Of a wheel
+ * without a speed there is no slip. */
+void tgi_find_silent(tg_estimator *e, double time)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t exempt = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap;
+    int32_t silent = !exempt && e->drawbar.count > 0 && is_silent(e, &e->drawbar, time);
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const int32_t speed = is_silent(e, &e->wheel[i], time), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
+        e->scene.silent[i] = exempt ? 0 : speed ? 2 : (tg_real)torque;
+        silent |= e->scene.silent[i] > 0;
+    }
+    e->scene.any_silent = (tg_real)silent;
+}

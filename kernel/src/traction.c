@@ -112,7 +112,7 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
 }
 
 /* Of what only all wheels' speeds and torques tell, nothing while one of them is silent. */
-static void leave_unheard(const tgi_scene *scene, int32_t n, tg_real *o)
+static void leave_unknown(const tgi_scene *scene, int32_t n, tg_real *o)
 {
     const int32_t undefined[] = {TG_OUT_ADHESION, TG_OUT_ADHESION_STD, TG_OUT_NET_TRACTION, TG_OUT_NET_TRACTION_STD, TG_OUT_EFFICIENCY, TG_OUT_EFFICIENCY_STD};
     for (int32_t k = 0; k < 6; k++) blank(o, undefined[k], n);
@@ -140,6 +140,6 @@ void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, c
         o[TG_OUT_GROUND_SPEED] = -o[TG_OUT_GROUND_SPEED];
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];
     }
-    if (scene->unheard > 0) leave_unheard(scene, n, o);
+    if (scene->any_silent > 0) leave_unknown(scene, n, o);
     if (scene->standing || !scene->seen_motion) leave_open(scene, n, o);
 }
