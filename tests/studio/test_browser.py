@@ -84,7 +84,7 @@ def test_a_curve_set_by_hand_says_how_far_it_is_from_the_fit(page: Any, served: 
     fitted = float(page.input_value("#field-a"))
     page.fill("#field-a", str(fitted + 0.1))
     page.keyboard.press("Enter")
-    page.wait_for_selector(".apart:has-text('By hand')")
+    page.wait_for_selector(".apart:has-text('off this fit')")
     off = 0.1 * float(CURVES["exponential"].value(0.6, {"a": 1.0}))
     assert f"+{off:.2g} off this fit at 60 % slip" in page.inner_text(".apart")
 
