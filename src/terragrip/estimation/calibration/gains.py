@@ -30,7 +30,7 @@ _SEGMENT = 20.0  # m of track that count as one soil where there is no label
 _EDGE = 0.3  # m on either side of a soil's border
 _RADIUS = 0.003  # prior of the wheels' relative radii where the vehicle states none
 _LEAST_OFFSET = 1e-3  # N m
-_TOLD_PULL = 0.005  # relative: a smaller effect of a pull that no cell measures is not worth a sentence
+_LEAST_PULL_EFFECT = 0.005  # relative: a smaller effect of a pull that no cell measures is not reported
 _NO_PULL = (
     "no log has a drawbar_force, and what a tool pulls moves load between the axles, so that these gains are open by "
     "{:.1f} %: measure it, or leave hitch_height out of the vehicle file where nothing is ever towed"
@@ -98,12 +98,10 @@ def relative_gains(
     if not any("drawbar_force" in log.channels for log in logs):
         pull = _unseen_pull(table, vehicle, driven)
         moved = _considered_loads(fit, table, vehicle, driven, ChannelErrors(0.0, 0.0, pull))
-        own, covariance = (
-            own + moved,
-            covariance + moved,
-        )  # a pull differs from log to log, so the gains must not hold it
+        own = own + moved  # a pull differs from log to log, so the gains must not hold it
+        covariance = covariance + moved
         most = float(np.sqrt(moved.diagonal()[: len(driven)].max()))
-        if most > _TOLD_PULL:
+        if most > _LEAST_PULL_EFFECT:
             unknown.append(Unknown(f"{key}, axle to axle", _NO_PULL.format(100 * most)))
     rests_on = evidence(
         table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count

@@ -208,7 +208,7 @@ def torque_zeros(
 
 
 def _work(windows: Windows, torque: Floats) -> Floats:
-    """The torques (k,) of driving, of which torque (n, k) exceeds a twentieth; infinite where no driving was measured."""
+    """What a twentieth of the sizes of torque (n, k) in driving exceeds (k,); infinite where no driving was measured."""
     driving = np.abs(torque[np.abs(windows.ground_speed) > _DRIVING])
     return np.array([np.nanquantile(v, 0.95) if np.isfinite(v).any() else np.inf for v in driving.T])
 
