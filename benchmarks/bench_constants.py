@@ -171,6 +171,7 @@ def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Fig
         estimated = np.full(truth.shape, np.nan)
         if f"adhesion_{wheels[0]}" in estimates:
             estimated = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
+            rows &= np.isfinite(estimated).all(axis=1)  # none in rows of a gap
         r2.append(pooled_r2(truth, estimated, rows))
         held = intervals(result, estimates, wheels, rows)
         score.append([held.score[name] for name in SCORED])

@@ -326,8 +326,8 @@ typedef struct {
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
     tg_real slip_memory;            /* s over which slip and adhesion are remembered for that */
     tg_real most_slope;             /* of slip over adhesion */
-    tg_real slip_spread;            /* SD of a remembered slip; its variance grows by a fifth a second */
-    tg_real alike, carried_alike;   /* s over which the error of a dead-reckoned speed lasts; of one predicted by the accelerometer */
+    tg_real slip_spread, slip_apart; /* SD of a remembered slip; of slips of one drive about the usual one, until it shows it */
+    tg_real alike, carried_alike;   /* s over which the filter takes the error of a dead-reckoned speed to last; of one predicted by the accelerometer */
     tg_real reckoned_force, carried_force; /* force_walk times this beside it, meanwhile */
     tg_real shock_memory;           /* s: of what the accelerometer reads beyond the model */
     tg_real shock_samples;          /* samples that a shock lasts */
@@ -347,7 +347,7 @@ typedef struct {
     tg_real uneven_memory;          /* wheel radii over which their mean squares are averaged */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
     tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
-    tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is low-passed, or averaged */
+    tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is averaged, or low-passed as strongly */
     tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be at most */
     tg_real least_slip;             /* below it the secant of that curve is not known */
     tg_real small_slip;             /* SD of slip: a noise below it is small */

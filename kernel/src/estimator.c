@@ -292,7 +292,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;
-    tgi_reckon(e, &drive, course == TG_GO ? dt : 0, &row, q);
+    tgi_reckon(e, &drive, dt, course == TG_GO, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     report_adaptation(e, out->value);
     const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
@@ -314,7 +314,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     memcpy(out->value + TG_OUT_CHANNEL_NIS, row.channel_nis, sizeof row.channel_nis);
     const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
     tgi_watch_over(e, &row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
-    out->event = event_of(e, &row, gap || blind || course == TG_WAIT, lost);
+    out->event = event_of(e, &row, gap || blind || course == TG_WAIT || tgi_ground_is_silent(e, row.time), lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;

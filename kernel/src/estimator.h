@@ -54,6 +54,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real roughness; /* mean square of the variation of rho_s over uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
+    tg_real reckoned; /* least variance of a ground speed that is not measured, see reckoning.c; else 0 */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
     tg_real disputed;   /* of what its sensor and the forces disagree on, and of its samples' age, */
@@ -95,6 +96,9 @@ typedef struct { /* ground speed and slope error with their covariance */
 
 typedef struct { /* low-passed while the ground speed is measured; the whole vehicle */
     tg_real slip, adhesion;
+    tg_real usual, usual_adhesion; /* over the drive, */
+    tg_real apart, way;            /* mean square of the slips about those, wheel radii that these cover */
+    tg_real unseen;                /* wheel radii since a ground speed was measured */
 } tgi_slip_memory;
 
 typedef struct { /* uneven ground, see roughness.c */
@@ -109,10 +113,11 @@ typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
     tg_real usual[8], slip[8]; /* wheel: slip as a rule, and beyond that low-passed over `slip_length` */
     tg_real square, noise;     /* mean squares of that slip before the low-pass: the whole, and the part by errors of the wheel speeds */
+    tg_real level, sure;       /* mean square of the slip of all wheels; mean weight of a row in `usual` */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
 } tgi_warped;
 
-typedef struct { /* driven wheels over a stretch of the way, beyond their usual: sums over `length` wheel radii, and at its end means */
+typedef struct { /* driven wheels over a stretch of the way, beyond their usual: sums over `length` wheel radii, and at its end means, along and across */
     tg_real adhesion[8], slip[8], length;
 } tgi_stretch;
 
@@ -202,8 +207,8 @@ typedef struct { /* what follows from the settings alone */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
-    int32_t warps;                  /* there are more driven wheels than trends, see warp.c */
-    tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
+    int32_t warps, slopes;          /* of the driven wheels: by how many they are more than the trends, see warp.c; trends but the mean */
+    tg_real pulls[8], share;        /* wheel: 1 where driven and not merely measured; 1 over their number */
     tg_real inverse_radius[8];      /* wheel, of the rolling radius */
     tg_real at_rest[8];             /* wheel: its share of the driven wheels' load at rest */
     tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */
@@ -293,8 +298,10 @@ void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real
 void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 
 /* reckoning.c */
+int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
+void tgi_no_slips(tg_estimator *e);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
-void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
+void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q);
 
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
 

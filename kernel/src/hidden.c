@@ -2,25 +2,35 @@
  * instead: its force stays, and its adhesion changes with the load. Wheels share a curve, so with a wheel's adhesion and slip, each beyond
  * its usual and the other wheels', mu - g' s is the effect of load; g' is `bend` of the secant. In one row such slips are a fraction
  * of their noise. But unevenness is correlated over more than a wheel radius, and noise is not: the mean product of two stretches of
- * `slip_length`, their middles twice that apart, contains no noise, and becomes certain with distance. Only where no pattern of slips
- * beyond all trends is left; where there is, warp.c counts what slips hide. */
+ * `slip_length`, their middles twice that apart, contains no noise, and becomes certain with distance. It is that of the trends along and
+ * across (warp.c); what slips beyond all trends hide is counted there. */
 #include "estimator.h"
 
-/* Product of two deviations, each beyond the others', a driven wheel in the mean. */
-static tg_real product(const tg_estimator *e, const tg_real *a, const tg_real *b)
+#define TG_BEYOND_CHANCE ((tg_real)2) /* SDs */
+
+/* Leave of a value of the driven wheels (8,) what is neither their mean nor beyond all trends. */
+static void leave_trends(const tgi_constants *c, tg_real *value)
 {
-    const tg_real share = e->constants.share;
-    tg_real sum = 0, of_a = 0, of_b = 0;
+    tg_real warp[TG_MAX_WHEELS], mean = 0;
+    tgi_warp(c, value, warp);
     for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
-        sum += a[i] * b[i];
-        of_a += a[i];
-        of_b += b[i];
+        value[i] -= warp[i];
+        mean += value[i] * c->share;
     }
-    return (sum - of_a * of_b * share) * share / (1 - share);
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) value[i] -= c->pulls[i] * mean;
+}
+
+/* Product of two such values, a driven wheel in the mean, by the trends that are left. */
+static tg_real product(const tgi_constants *c, const tg_real *a, const tg_real *b)
+{
+    tg_real sum = 0;
+    for (int32_t i = 0; i < TG_MAX_WHEELS; i++) sum += a[i] * b[i];
+    return sum / (tg_real)c->slopes;
 }
 
 /* Add the products of two stretches, `away` wheel radii between their middles: to the variance of adhesion by load, and to that of the
- * adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them. */
+ * adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them, or greater ones as far as it is
+ * itself beyond two SDs of chance. */
 static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
 {
     tgi_hidden *h = &e->hidden;
@@ -33,21 +43,23 @@ static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stret
         here[i] = now->adhesion[i] - slope * now->slip[i];
         there[i] = before->adhesion[i] - slope * before->slip[i];
     }
-    const tg_real plain = product(e, now->adhesion, before->adhesion), beyond = product(e, here, there) - plain;
+    const tg_real plain = product(&e->constants, now->adhesion, before->adhesion), beyond = product(&e->constants, here, there) - plain;
     if (h->count < k->hill_memory / k->slip_length) h->count += 1;
     h->plain += (alike * plain - h->plain) / h->count;
     h->beyond += (alike * beyond - h->beyond) / h->count;
     h->weight += (alike * alike - h->weight) / h->count;
     h->square += (tgi_square(alike * beyond) - h->square) / h->count;
-    h->load = h->beyond / (h->weight + h->square / (h->count * tgi_square(shown)));
+    const tg_real found = tgi_square(h->beyond), chance = h->square / h->count;
+    const tg_real expected = tgi_square(shown * h->weight) + tgi_max(found - tgi_square(TG_BEYOND_CHANCE) * chance, 0);
+    h->load = h->beyond / (h->weight * (1 + chance / expected));
 }
 
-/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads; less, in proportion, where they
- * follow the curve. */
+/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads, by all trends and the mean; less, in
+ * proportion, where they follow the curve. */
 tg_real tgi_by_load(const tg_estimator *e, tg_real scatter)
 {
     const tgi_hidden *h = &e->hidden;
-    if (h->load >= 0 || !(h->plain > 0)) return scatter + tgi_max(h->load, 0);
+    if (h->load >= 0 || !(h->plain > 0)) return scatter + tgi_max(h->load, 0) * (1 - e->constants.share * (tg_real)e->constants.warps);
     return scatter * tgi_max(1 + h->load * h->weight / h->plain, 0);
 }
 
@@ -59,6 +71,8 @@ static void end_stretch(tg_estimator *e)
         now->adhesion[i] /= now->length;
         now->slip[i] /= now->length;
     }
+    leave_trends(&e->constants, now->adhesion);
+    leave_trends(&e->constants, now->slip);
     const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2, apart = 2 * e->settings.tuned.slip_length;
     const tgi_stretch *const before = near >= apart ? last : older;
     const tg_real away = near >= apart ? near : far;

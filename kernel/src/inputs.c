@@ -223,6 +223,12 @@ static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
     return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
 }
 
+/* Whether the ground speed is silent while the vehicle drives: it is reckoned. */
+int32_t tgi_ground_is_silent(const tg_estimator *e, double time)
+{
+    return !e->standing && e->seen_motion && time - e->ground_time > (double)e->settings.gap && is_silent(e, &e->ground, time);
+}
+
 /* Which wheels' speeds (2) or drive torques (1) are silent while the vehicle drives and others are measured, and whether any is, or a
  * drawbar force that was measured before: the thrust or pull that is unknown then and the soil's resistance look alike. Of a wheel
  * without a speed there is no slip. */

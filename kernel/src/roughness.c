@@ -67,7 +67,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         own /= (tg_real)driven;
     }
     if (e->constants.warps) tgi_watch_warp(e, flowing, travelled, fresh, gain);
-    else if (driven > 1 && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, flowing, travelled, fresh);
+    if (e->constants.slopes && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, flowing, travelled, fresh);
     const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
     count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);
     r->square += gain * (square - r->square);

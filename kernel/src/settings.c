@@ -44,8 +44,9 @@ static tg_tuned default_tuned(void)
     k.slip_memory = (tg_real)0.3;
     k.most_slope = (tg_real)0.4;
     k.slip_spread = (tg_real)0.04;
-    k.alike = (tg_real)0.3;
-    k.carried_alike = (tg_real)0.5;
+    k.slip_apart = (tg_real)0.15;
+    k.alike = (tg_real)0.1;
+    k.carried_alike = (tg_real)0.1;
     k.reckoned_force = 120;
     k.carried_force = 12;
     k.shock_memory = 5;
@@ -335,8 +336,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     work_out_constants(settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
-    e->slip_memory.slip = settings->tuned.first_slip;
-    e->slip_memory.adhesion = settings->prior_adhesion;
+    tgi_no_slips(e);
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
     tgi_no_curves(e);
     tgi_believe(e);

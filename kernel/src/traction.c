@@ -49,7 +49,7 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED],
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
     c->rr += scene->roughness + scene->unseen_grade;
-    c->vv += scene->slow_speed + scene->disputed + scene->late;
+    c->vv = tgi_max(c->vv, scene->reckoned) + scene->slow_speed + scene->disputed + scene->late;
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]) + scene->chatter[i];
 }
 

@@ -14,12 +14,13 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
     tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0;
-    int32_t found = 0, driven = 0;
+    int32_t found = 0, driven = 0, merely = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
     for (int32_t i = 0; i < n; i++) {
         c->inverse_radius[i] = 1 / s->rolling_radius[i];
         c->pulls[i] = s->driven[i] ? 1 : 0;
         driven += s->driven[i] != 0;
+        merely |= s->driven[i] && !c->watched[i];
         whole += weight[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
     }
     for (int32_t a = 0; a < TG_TRENDS && driven; a++) {
@@ -49,6 +50,7 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
         }
     }
     c->warps = driven - found;
+    c->slopes = found > 1 && !(merely && c->warps) ? found - 1 : 0; /* see hidden.c */
     c->share = driven ? 1 / (tg_real)driven : 0;
 }
 
@@ -99,19 +101,24 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
 {
     tgi_warped *w = &e->warped;
     const tgi_constants *c = &e->constants;
-    tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0;
+    tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0, all = 0;
     if (!tgi_slips(e, 0, slip, &variance)) { /* what a turn does is a trend, and a gyroscope's noise is none */
         memset(w->slip, 0, sizeof w->slip);
         return;
     }
-    const tg_real rolled = travelled * rims_way(e), soon = rolled / (e->settings.tuned.slip_length + rolled);
+    /* As noisy as a mean over slip_length, and as late. */
+    const tg_real rolled = travelled * rims_way(e), soon = rolled / (e->settings.tuned.slip_length / 2 + rolled);
     const tg_real fresh = rolled / (e->settings.tuned.uneven_length + rolled); /* of the rims' distance: the vehicle covers none where wheels spin on the spot */
     tgi_warp(c, slip, warp);
     const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
     const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row is less certain than usual */
+    for (int i = 0; i < TG_MAX_WHEELS; i++) all += tgi_square(slip[i]) * c->share;
+    const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* of radii and ruts a spinning wheel's slip tells nothing */
+    w->sure = w->sure > 0 ? w->sure + gain * (sure - w->sure) : sure;
+    const tg_real learned = gain * sure / w->sure;
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
-        w->usual[i] += weight * gain * beyond;
+        w->usual[i] += learned * beyond;
         w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
         pull += c->at_rest[i] * e->belief.x[i];
@@ -119,6 +126,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
     }
     w->square += weight * gain * (square * c->share - w->square);
     w->noise += weight * gain * (noise - w->noise);
+    w->level += weight * gain * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
     w->pulling += fresh * (pull - w->pulling);
     w->slipping += fresh * (mean - w->slipping);
 }
@@ -140,13 +148,14 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
 static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
 
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
- * show. Returns the relative variance of both: that of a guess between the two, and the secant of the curve less what was explained. */
+ * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
+ * those slips relative to the wheels' slip in the same rows, since a load moves a small slip by little and a large one by much. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
-    const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0;
+    const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
     tg_real lasting = 0, farthest = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
     const tg_real slope = explained * tgi_max(w->pulling, 0) * inverse / beyond_line(k, farthest, inverse); /* one for all: thrust stays */
@@ -154,6 +163,6 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;
     }
-    const tg_real hidden = (k->bend_spread - explained) * inverse * tgi_sqrt(excess);
-    return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square(hidden / beyond_line(k, tgi_sqrt(excess), inverse));
+    const tg_real hidden = (k->bend_spread - explained) * relative / beyond_line(k, relative, 1);
+    return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square(hidden);
 }

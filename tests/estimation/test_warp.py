@@ -107,6 +107,14 @@ def test_a_diagonal_that_slips_more_is_higher_on_the_curve() -> None:
     assert 0.2 * secant < np.std(pattern) / np.std(slips) < 0.7 * secant
 
 
+def test_what_slips_tell_is_no_later_than_their_mean_over_a_quarter_of_a_radius() -> None:
+    """An eighth of a radius: the adhesion of a wheel that loses load follows its slip."""
+    pattern, slips, _ = told(slipping(drive(30.0)))
+    here = slips[50:-50]
+    late = max(range(-20, 40), key=lambda k: np.corrcoef(pattern[50 + k :][: len(here)], here)[0, 1])
+    assert late / 100 * 0.6 / RADIUS < 0.125
+
+
 def test_gaps_do_not_make_slips_tell_less() -> None:
     """A row whose slips are hardly known, as after a gap, says little of how well they are known as a rule."""
     plain = drive(30.0)
@@ -146,3 +154,17 @@ def test_a_diagonals_slip_is_forgotten_as_its_wheels_roll_on() -> None:
     pattern = np.array(LAYOUT["diagonal"]) @ np.stack([estimates[f"adhesion_{w}"] for w in WHEELS]) / 4
     at, later = np.searchsorted(time, stop), (time > stop + 0.2) & (time < stop + 0.3)
     assert np.abs(pattern[later]).max() < 0.1 * abs(pattern[at])
+
+
+def test_what_a_wheel_slipped_while_it_spun_is_not_its_usual() -> None:
+    """For ninety wheel radii one wheel spins; two seconds after it grips, its adhesion is that of the others."""
+    plain = drive(50.0)
+    time, channels = plain.recording.time, dict(plain.recording.channels)
+    spins = (time > 10) & (time < 40)
+    channels["wheel_speed_fl"] = channels["wheel_speed_fl"] * np.where(spins, 10.0, 1.0)
+    estimates = estimate(replace(plain.recording, channels=channels), robot())
+    late = time > 42
+    for wheel in WHEELS:
+        true = plain.truth[f"adhesion_{wheel}"][late]
+        assert np.mean(np.abs(estimates[f"adhesion_{wheel}"][late] - true)) < 0.15 * np.mean(true)
+        assert np.mean(estimates[f"adhesion_{wheel}_std"][late]) < 0.4 * np.mean(true)

@@ -37,11 +37,21 @@ def eventful() -> Recording:
     return log.with_channels(**changed)
 
 
-@pytest.fixture(scope="module")
-def table() -> tuple[Recording, Estimates]:
-    log = eventful()
+def watched(log: Recording) -> tuple[Recording, Estimates]:
     with undisputed():  # the twin reads spreads, of which the kernel leaves the delay out, too
         return log, estimate(log, robot(), sensors={DELAY: 0.0})
+
+
+@pytest.fixture(scope="module")
+def table() -> tuple[Recording, Estimates]:
+    return watched(eventful())
+
+
+@pytest.fixture(scope="module")
+def blind() -> tuple[Recording, Estimates]:
+    """Nothing tells the slope."""
+    log = eventful()
+    return watched(Recording(log.time, {name: x for name, x in log.channels.items() if name != "pitch"}))
 
 
 def spell(table: Estimates, kind: str) -> tuple[int, int]:
@@ -52,8 +62,9 @@ def spell(table: Estimates, kind: str) -> tuple[int, int]:
     return first, first + int(np.argmin(has[first:]))
 
 
-def test_kernel_and_twin_say_the_same_of_every_row(table: tuple[Recording, Estimates]) -> None:
-    log, result = table
+@pytest.mark.parametrize("drive", ["table", "blind"])
+def test_kernel_and_twin_say_the_same_of_every_row(drive: str, request: pytest.FixtureRequest) -> None:
+    log, result = request.getfixturevalue(drive)
     limits = watch_limits(RADIUS)
     watch, events, points, score = Watch(limits, pace(result.vehicle, limits), RADIUS), [], [], []
     rows = rows_of(result, np.isfinite(log["ground_speed"]))

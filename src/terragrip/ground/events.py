@@ -134,6 +134,12 @@ def _gap(estimates: Estimates, rows: Ints) -> str:
             f"A wheel's speed, a drive torque or the drawbar force did not come for more than {gap:g} s, or had not come yet: adhesion, "
             "net traction, efficiency and soil resistance are unknown, and so is the slip of a wheel without a speed."
         )
+    goes_on = (estimates["channels"][rows] > 0) & np.isfinite(_mean(estimates, "slip", rows))
+    if estimates.has_adhesion and np.mean(goes_on) > 0.5:
+        return (
+            f"The wheels' speeds came, but no ground speed for more than {gap:g} s: speed and slip are reckoned from the wheels and "
+            "the slips so far, with wide intervals; spinning and being stuck are not seen, and adhesion goes on from the torques."
+        )
     return (
         f"No wheel speed or ground speed came for more than {gap:g} s, or none had come yet: the motion starts again; "
         "what was known of the ground is kept with a wider spread."

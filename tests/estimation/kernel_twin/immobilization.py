@@ -51,16 +51,16 @@ class Row:
 
 @contextmanager
 def undisputed() -> Iterator[None]:
-    """Within it estimates do not doubt a ground speed for what the filter has not followed of it.
+    """Within it estimates do not doubt a ground speed for what the filter has not followed of it, nor a resistance for unseen hills.
 
-    The kernel's watch leaves that out of the SDs, and a table does not say how much of an SD it is: only without it are the table's rows
-    what the kernel sees. No figure depends on it but SDs of ground speed and slip.
+    The kernel's watch leaves both out of the SDs, and a table does not say how much of an SD they are: only without them are the table's
+    rows what the kernel sees. No figure depends on them but SDs of ground speed, slip and resistance.
     """
     made_by = estimator.settings_of
 
     def settings_of(*args: Any, **more: Any) -> Any:
         made = made_by(*args, **more)
-        made.tuned.alike_sure, made.tuned.longest_walk = 1e12, 1e-12
+        made.tuned.alike_sure, made.tuned.longest_walk, made.tuned.soil_spread = 1e12, 1e-12, 1e12
         return made
 
     estimator.settings_of = settings_of
@@ -73,9 +73,7 @@ def undisputed() -> Iterator[None]:
 def rows_of(estimates: Estimates, measured: NDArray[np.bool_]) -> list[Row]:
     """Rows of a table of estimates as the kernel sees them; ``measured``: whether each row's ground speed was.
 
-    Estimates made within :func:`undisputed`.
-    Where nothing tells the slope, the table's SD of the resistance holds hills, which the kernel's watch leaves out (decision 0149).
-    Raises InputError where the estimates contain no vehicle.
+    Estimates made within :func:`undisputed`. Raises InputError where the estimates contain no vehicle.
     """
     vehicle = estimates.vehicle
     driven = np.array(vehicle.driven, bool)

@@ -1,0 +1,87 @@
+"""The ground speed's sensor is silent for over a minute while wheels and torques go on: intervals hold, and an event says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.estimation.drives import WHEELS, Drive, drive, robot
+
+from terragrip.estimation import Estimates, estimate
+from terragrip.ground.events import events
+
+LOST, BACK = 60.0, 130.0  # s
+
+
+def lost(made: Drive) -> tuple[Estimates, NDArray[np.bool_]]:
+    """Estimates of the drive without its ground speed between LOST and BACK, and the rows there in which it moves."""
+    time, channels = made.recording.time, dict(made.recording.channels)
+    silent = (time > LOST) & (time < BACK)
+    channels["ground_speed"] = np.where(silent, np.nan, channels["ground_speed"])
+    estimates = estimate(replace(made.recording, channels=channels), robot())
+    return estimates, silent & (made.truth["ground_speed"] > 0.05)
+
+
+def held(estimates: Estimates, made: Drive, rows: NDArray[np.bool_], name: str) -> float:
+    """The share of rows whose 95 % interval holds the truth."""
+    error, spread = estimates[name] - made.truth[name], estimates[f"{name}_std"]
+    return float(np.mean(np.abs(error[rows]) < 1.96 * spread[rows]))
+
+
+def soils(t: Any) -> Any:
+    """Slip that steps every 8 s."""
+    return np.interp(t, np.arange(0, 161, 8), [0.05, 0.15, 0.08, 0.22, 0.1, 0.06, 0.18] * 3)
+
+
+def stops(t: Any) -> Any:
+    """A stop of 8 s every 20 s."""
+    phase = t % 20
+    return 0.6 * np.clip(phase / 2, 0, 1) * np.clip((12 - phase) / 2, 0, 1)
+
+
+@pytest.mark.parametrize("imu", [True, False])
+@pytest.mark.parametrize("rate", [10.0, 100.0])
+def test_intervals_hold_and_are_no_wider_than_soils_differ(rate: float, imu: bool) -> None:
+    made = drive(140.0, rate=rate, imu=imu, slip=soils)
+    estimates, rows = lost(made)
+    assert held(estimates, made, rows, "slip_fl") > 0.92
+    assert held(estimates, made, rows, "adhesion_fl") > 0.92
+    assert np.mean(estimates["slip_fl_std"][rows]) < 3 * np.std(made.truth["slip_fl"])
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_wheels_that_spin_as_it_goes_do_not_spin_for_the_rest(imu: bool) -> None:
+    """As usual they slip .1; when the sensor goes, .7 for 3 s."""
+
+    def spins(t: Any) -> Any:
+        return 0.1 + 0.6 * np.clip((t - LOST + 3) / 0.5, 0, 1) * np.clip((LOST + 0.5 - t) / 0.5, 0, 1)
+
+    made = drive(140.0, rate=20.0, imu=imu, slip=spins, speed=lambda t: 0.6 * (1 - spins(t)) / 0.9)
+    estimates, rows = lost(made)
+    assert held(estimates, made, rows, "slip_fl") > 0.7
+    late = rows & (made.recording.time > LOST + 40)
+    assert np.max(np.abs(estimates["slip_fl"] - made.truth["slip_fl"])[late]) < 0.15
+
+
+def test_an_accelerometers_bias_does_not_drive_a_vehicle_that_stands() -> None:
+    made = drive(140.0, rate=50.0, imu=True, speed=stops)
+    channels = dict(made.recording.channels)
+    time = made.recording.time
+    channels["acceleration_x"] = channels["acceleration_x"] + 0.15 * np.clip((time - LOST) / 5, 0, 1)
+    estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)))
+    error = np.abs(estimates["ground_speed"] - made.truth["ground_speed"])[rows]
+    assert np.quantile(error, 0.98) < 0.2
+
+
+def test_an_event_says_so() -> None:
+    made = drive(140.0, rate=20.0)
+    estimates, _ = lost(made)
+    time, gap = made.recording.time, estimates["event"] == "gap"
+    assert gap[(time > LOST + 3) & (time < BACK)].all()
+    assert not gap[(time < LOST + 2) | (time > BACK + 0.1)].any()
+    assert all(np.isfinite(estimates[f"adhesion_{w}"][gap]).all() for w in WHEELS)
+    (only,) = events(estimates)
+    assert (only.kind, "no ground speed" in only.why) == ("gap", True)
