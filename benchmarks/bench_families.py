@@ -160,9 +160,7 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
         elif view == "after calibrate":
             if "drawbar_force" not in seen.recording.channels:  # what that drive tows is in no channel
                 continue
-            drive = draw(kind, seed, rate=VIEW_RATE, task="healthy", duration=CALIBRATING)
-            if drive.vehicle.mass != vehicle.mass:  # it tipped over there, and another was drawn
-                continue
+            drive = another_drive(kind, seen)
             vehicle = calibrate(drive.recording, vehicle).apply(vehicle)
         elif view == "no accelerometer":
             if "acceleration_x" not in seen.recording.channels:
@@ -183,6 +181,13 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
         over = {name: held.score[name] / oracle[name] for name in SCORED}
         out.append(View(kind, seed, view, pooled_r2(truth, estimated, outside), held, over))
     return out
+
+
+def another_drive(kind: Kind, result: SimulationResult) -> SimulationResult:
+    """A drive of CALIBRATING seconds of the result's machine, on other ground."""
+    if kind in second.kinds():
+        return second.another_drive(kind, result.seed, rate=VIEW_RATE, duration=CALIBRATING)
+    return families.draw(kind, result.seed, rate=VIEW_RATE, task="healthy", duration=CALIBRATING)
 
 
 def result_without(result: SimulationResult, start: str) -> SimulationResult:

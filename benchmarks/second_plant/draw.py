@@ -79,7 +79,7 @@ def drive(
         _last.clear()
         _last[which] = run(*planned.drive)
     done = _last[which]
-    if max(np.abs(done["pitch"]).max(), np.abs(done["roll"]).max()) > TIPPED:
+    if _tipped(done):
         return drive(
             kind,
             seed + 1_000_000,
@@ -89,6 +89,24 @@ def drive(
             duration=planned.scenario.duration if task == "healthy" else None,
         )
     return done, planned.scenario, planned.scenario.nominal_vehicle(), seed
+
+
+def another_drive(kind: Kind, seed: int, *, rate: float | None = None, duration: float) -> SimulationResult:
+    """A healthy drive, on other ground, of the machine that `draw` puts to work on ``seed`` (its result's own: one that tips over has
+    another). Ground on which it tips over is drawn anew. Arguments and errors as `plan`'s."""
+    machine = _machine(stream(seed, f"second plant {kind} work"), kind.mass)
+    for ground in range(1, 100):
+        planned = plan(
+            kind, seed, rate=rate, task="healthy", duration=duration, machine=machine, ground=ground
+        )
+        done = run(*planned.drive)
+        if not _tipped(done):
+            return result_of(done, planned.scenario, planned.scenario.nominal_vehicle(), seed)
+    raise ValueError(f"{kind}, seed {seed}: the machine tips over on any ground")
+
+
+def _tipped(done: Run) -> bool:
+    return bool(max(np.abs(done["pitch"]).max(), np.abs(done["roll"]).max()) > TIPPED)
 
 
 @dataclass(frozen=True)
@@ -117,18 +135,21 @@ def plan(
     faults: bool = False,
     task: str = "work",
     duration: float | None = None,
+    machine: Machine | None = None,
+    ground: int = 0,
 ) -> Plan:
     """One machine, its ground and its work.
 
     ``task``: work (speeds, pulls, curves, stops and starts), healthy (the same, rougher, for warnings) or digging (a steady command
-    into soft ground, in which slip digs the wheels in). ``duration`` [s], where not drawn. Its scenario holds machine, sensors and
-    drive; the ground is this plant's own.
+    into soft ground, in which slip digs the wheels in). ``duration`` [s] and ``machine``, where not drawn; ``ground``: which of the
+    seed's grounds and drives. Its scenario holds machine, sensors and drive; the ground is this plant's own.
     Raises ValueError on a kind or task that there is not.
     """
     if kind not in kinds() or task not in TASKS:
         raise ValueError(f"no such kind or task: {kind}, {task}")
-    rng = stream(seed, f"second plant {kind} {task}")
-    machine = _machine(rng, kind.mass)
+    rng = stream(seed, f"second plant {kind} {task}" + (f" {ground}" if ground else ""))
+    drawn = _machine(rng, kind.mass)
+    machine = drawn if machine is None else machine
     tree, vehicle = _machine_tree(machine, seed, kind, rate)
     beat = np.sqrt(machine.scale)
     if task == "digging":
@@ -152,7 +173,7 @@ def plan(
     else:
         points = draw_speeds(rng, machine, duration)
     mix_at, mix = _mix(rng, machine, task, len(soils), speed_of=points)
-    ground = Ground(
+    driven_over = Ground(
         soils=tuple(soils),
         mix_at=mix_at,
         mix=mix,
@@ -175,7 +196,7 @@ def plan(
     error = scenario.robot.wheel_radius_sd * stream(seed, "wheel radius").standard_normal()
     radius = vehicle.wheel_radius * (1.0 + error)
     step = 1.0 / (200.0 * np.ceil(0.005 / (0.002 * beat)))
-    return Plan(scenario, vehicle, radius, ground, work, float(step))
+    return Plan(scenario, vehicle, radius, driven_over, work, float(step))
 
 
 def _machine(rng: np.random.Generator, mass: str) -> Machine:

@@ -188,3 +188,14 @@ def test_drawn_machines_keep_the_balance_the_truth_claims(task):
         assert t.stuck.iloc[-1]
     else:
         assert t.stuck.mean() < 0.05
+
+
+def test_another_drive_is_of_the_same_machine_on_other_ground():
+    kind = second.kinds()[0]
+    work = second.draw(kind, 3, rate=20.0)
+    other = second.another_drive(kind, work.seed, rate=20.0, duration=8.0)
+    assert other.vehicle.to_dict() == work.vehicle.to_dict()
+    assert other.true_parameters == work.true_parameters
+    assert other.truth["true_ground_speed"].max() > 0.1
+    rows = len(other.truth)
+    assert not np.allclose(other.truth["true_slope"], work.truth["true_slope"][:rows], atol=1e-4)
