@@ -22,8 +22,8 @@ INERTIAL = ("angular_velocity_z", "acceleration_x", "pitch")
 
 
 @cache
-def drive(kind: families.Kind, seed: int, rate: float) -> tuple[Recording, Vehicle]:
-    result = families.draw(kind, seed, rate=rate, duration=200.0)
+def drive(kind: families.Kind, seed: int, rate: float | None) -> tuple[Recording, Vehicle]:
+    result = families.draw(kind, seed, rate=rate, duration=None if rate is None else 200.0)
     return result.recording, result.vehicle
 
 
@@ -78,6 +78,14 @@ def test_a_late_gyroscope_alone_is_named_alone() -> None:
     assert note.startswith(
         "angular_velocity_z is 0.30 s behind the wheel speeds: if it is late, write 'delay: 0.30 s' for it"
     )
+
+
+@pytest.mark.parametrize("seed", [737, 1])
+def test_an_accelerometer_that_goes_with_the_ground_speed_is_not_late(seed: int) -> None:
+    """Where a tractor pulls near the top of its curve, it follows its wheels .2 s late, and so do both sensors of its motion."""
+    log, vehicle = drive(families.Kind("tractor", "saturating", "uncoupled", "rigid"), seed, None)
+    assert lag_notes(log, vehicle) == []
+    assert lag_notes(later(log, INERTIAL, 0.5), vehicle)
 
 
 def test_wheel_speeds_that_are_held_are_compared_by_their_updates() -> None:

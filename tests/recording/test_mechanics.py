@@ -191,6 +191,17 @@ def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str
         assert bool(notes) == bool(expected)
 
 
+@pytest.mark.parametrize(
+    "stated", [{"uncertainty": {"drawbar_offset": "20 N"}}, {"sensors": {"drawbar_force": "5 N"}}, {}]
+)
+def test_a_cell_of_the_vehicle_file_that_reads_0_throughout_is_named(stated: dict[str, object]) -> None:
+    columns = drive()
+    notes = notes_on(
+        {**columns, "drawbar_force": np.zeros(len(columns["time"]))}, machine(hitch_height=0.3, **stated)
+    )
+    assert ("exactly 0 in all rows" in notes) is bool(notes) is bool(stated)
+
+
 @pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])
 def test_an_accelerometer_that_is_tilted_is_named(bias: float, expected: str) -> None:
     columns = drive()

@@ -68,3 +68,9 @@ def test_torques_with_which_nothing_rolls_are_named(
     }
     notes = unit_warnings(Recording.from_frame(small), vehicle)
     assert any("with which no vehicle starts or rolls on ground" in note for note in notes) is said
+
+
+def test_a_radius_that_is_right_to_a_per_cent_is_left_alone() -> None:
+    """On hard ground the wheels slip by less than their radii are off."""
+    result = families.draw(families.Kind("tractor", "saturating", "uncoupled"), 36001, rate=50.0)
+    assert notes_on(result, 1.0) == []

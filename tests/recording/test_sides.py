@@ -9,6 +9,7 @@ import pytest
 
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.sides import side_warnings
+from terragrip.simulation import families, simulate
 from terragrip.vehicle import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -178,3 +179,16 @@ def test_an_uneven_torque_hides_no_wrong_unit_of_a_speed() -> None:
     notes = " ".join(notes_on(skidding(), ground_speed=1 / 0.5144, drive_torque_fl=1.4))
     assert "drive_torque_fl is 1.4" in notes
     assert "ground_speed may be in knots" in notes
+
+
+def test_simulated_torques_of_left_and_right_exchanged_are_named_and_right_ones_are_not() -> None:
+    """The paper's robot turns with a thirtieth of a wheel's load; a machine whose sides pull alike shows nothing, whatever chance does."""
+    run = simulate("multi1", 2)
+    swapped = dict(run.recording.channels)
+    for axle in run.vehicle.axles.values():
+        left, right = (f"drive_torque_{wheel}" for wheel in (axle.wheels[0], axle.wheels[-1]))
+        swapped[left], swapped[right] = swapped[right], swapped[left]
+    notes = unit_warnings(replace(run.recording, channels=swapped), run.vehicle)
+    assert any("in turns the wheel that is faster than its hub would brake" in note for note in notes)
+    alike = families.draw(families.Kind("robot", "brixius", "even", "rolling"), 36078)
+    assert unit_warnings(alike.recording, alike.vehicle) == []

@@ -32,8 +32,11 @@ def clock_times(time: Floats, start: datetime) -> npt.NDArray[np.datetime64]:
 
 
 def clock_text(when: float) -> str:
-    """A time [s since 1970] in ISO 8601, UTC, to the microsecond."""
-    return datetime.fromtimestamp(when, UTC).isoformat()
+    """A time [s since 1970] in ISO 8601, UTC, to the microsecond; as a number of seconds where that is no date."""
+    try:
+        return datetime.fromtimestamp(when, UTC).isoformat()
+    except (ValueError, OverflowError, OSError):
+        return f"{when:.6g} s"
 
 
 def clock_unit(stamp: float) -> str | None:

@@ -37,7 +37,10 @@ def inertial_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if courses is None:
         return []
     step, speed, pairs = courses
-    lags = {name: _lag(own, wheels, step, speed) for name, (own, wheels) in pairs.items()}
+    lags = {
+        name: _lag(own, wheels, step, speed) if other is None or not _together(own, other, step) else 0.0
+        for name, (own, wheels, other) in pairs.items()
+    }
     late = {name: seconds for name, seconds in lags.items() if seconds}
     if late and np.ptp(list(late.values())) < 2.5 * step:  # of one sensor
         return [_sentence(float(np.mean(list(late.values()))), list(late))]
@@ -46,8 +49,9 @@ def inertial_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 def _courses(
     recording: Recording, vehicle: Vehicle
-) -> tuple[float, float, dict[str, tuple[Floats, Floats]]] | None:
-    """The points' distance [s], the usual speed of the rims [m/s], and of each channel its quick course and that of the wheels."""
+) -> tuple[float, float, dict[str, tuple[Floats, Floats, Floats | None]]] | None:
+    """The points' distance [s], the usual speed of the rims [m/s], and of each channel its quick course, that of the wheels, and of the
+    acceleration that of the ground speed."""
     channels = recording.channels
     found = points_of(recording.time, _MOST_TIME)
     if found is None or not {"angular_velocity_z", "acceleration_x"} & channels.keys():
@@ -76,13 +80,20 @@ def _courses(
     shown = {"acceleration_x": np.gradient(smooth(rim, CALM, step), step)}
     if sides:
         shown["angular_velocity_z"] = np.mean(sides, axis=0)
-    own = {name: at(name) for name in sorted(shown)}
+    own, ground = {name: at(name) for name in sorted(shown)}, at("ground_speed")
+    rate = None if ground is None else quick(np.gradient(smooth(ground, CALM, step), step), step)
     pairs = {
-        name: (quick(values, step), quick(shown[name], step))
+        name: (quick(values, step), quick(shown[name], step), rate if name == "acceleration_x" else None)
         for name, values in own.items()
         if values is not None
     }
     return step, median(np.abs(rim[fast])), pairs
+
+
+def _together(own: Floats, other: Floats, step: float) -> bool:
+    """Whether two courses are of one instant."""
+    seconds, alike, _ = lag_of(own, other, step, max(_WITHIN, 5 * step))
+    return alike > _ALIKE and abs(seconds) <= max(_LAG, step) + 1e-9
 
 
 def _lag(own: Floats, wheels: Floats, step: float, speed: float) -> float:

@@ -121,7 +121,7 @@ def motion_warnings(
         notes = _dead_warnings(recording, vehicle)
         notes += radius_warnings(recording, vehicle, means)
         thrusts = {} if notes else thrusts
-        notes += _pull_warnings(means, thrusts, recording, vehicle)
+        notes += _pull_warnings(means, thrusts, recording, vehicle) or _silent_cell(recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
         found = found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
@@ -291,6 +291,18 @@ def _pull_warnings(
             "drawbar_force stays below a thousandth of the weight: it may be in kN: write 'unit: kN' for it in the profile."
         ]
     return []
+
+
+def _silent_cell(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A drawbar force of 0 in all rows, which no cell reads, though the vehicle file has one's noise, zero or gain."""
+    pull, unsure = recording.channels.get("drawbar_force"), vehicle.uncertainty
+    stated = (vehicle.sensors.drawbar_force, unsure.drawbar_gain, unsure.drawbar_offset)
+    if pull is None or np.nan_to_num(pull).any() or not (any(stated) or vehicle.calibration.drawbar_offset):
+        return []
+    return [
+        "drawbar_force is exactly 0 in all rows, which no cell reads, but the vehicle file has a cell's errors: if it was not connected, "
+        "leave the column out."
+    ]
 
 
 def _offset_warnings(means: Means, forward: Floats) -> list[str]:

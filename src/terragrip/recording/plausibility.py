@@ -12,6 +12,7 @@ from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
 from terragrip.recording.dropouts import dropout_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
+from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
@@ -89,7 +90,11 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     moved = motion_warnings(recording, vehicle, means, thrusts)
     unsigned = [] if known is None else sign_warnings(recording, known)
     copied = [] if known is None else copy_warnings(whole, known)
-    speeds = [] if known is None or sided else _speed_warnings(recording, known)
+    speeds = (
+        []
+        if known is None or sided
+        else _speed_warnings(recording, known) or free_axle_warnings(recording, known)
+    )
     placed = _position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds))
     courses = None if speeds or sided or placed else Courses.of(recording, known)
     moved = moved or acceleration_warnings(courses)
@@ -123,6 +128,11 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     if backward:
         return backward
     return exchanged_torques(recording, known, shown) or axle_warnings(recording, known, means)
+
+
+def speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """Of `unit_warnings` those of wheel speeds against the ground speed alone: some seconds of driving are enough."""
+    return _speed_warnings(averaged(recording, _FINEST), vehicle) if vehicle.knows_wheels else []
 
 
 def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -29,6 +29,7 @@ _LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
 _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
 _PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
 _MOST = 0.75  # of the windows with such a thrust
+_RADII = 0.01  # radii that are known so well are right
 
 
 def driven_radii(vehicle: Vehicle) -> dict[str, float]:
@@ -86,7 +87,7 @@ def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> l
     thrust = np.sum([means.of(channels[f"drive_torque_{w}"]) / r for w, r in radii.items()], axis=0)
     straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
     rows = np.isfinite(slip) & straight & (thrust > _PULLING * vehicle.mass * STANDARD_GRAVITY)
-    if rows.sum() < _LEAST or quantile(slip[rows], _MOST) >= 0.0:
+    if rows.sum() < _LEAST or quantile(slip[rows], _MOST) >= -_RADII:
         return []
     slower = 1 - 1 / (1 - median(slip[rows]))
     if 1 - slower < RATIOS[0]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, suggestion
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
 from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
@@ -125,7 +125,13 @@ class Recording:
         """The column ``name``: time, a channel or a label; raises KeyError if there is none."""
         if name == TIME:
             return self.time
+        if name not in self.labels and name not in self.channels:
+            raise KeyError(suggestion(name, [*self.channels, *self.labels]) or name)
         return self.labels[name] if name in self.labels else self.channels[name]
+
+    def __repr__(self) -> str:
+        span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self) else "no row"
+        return f"<Recording: {len(self)} rows, {span}: {', '.join([*self.channels, *self.labels])}>"
 
     @property
     def clock_zero(self) -> float | None:

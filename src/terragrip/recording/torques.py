@@ -1,8 +1,8 @@
 """The drive torques against the drawbar force and the wheels' change of speed: sentences for the user, never errors.
 
 At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust follows
-the sum of the first two one to one and at once; another scale, or a lag, is an error of a channel. Where a tool pulls and no cell
-measures it, the thrust follows an unknown force, and nothing is reported.
+the sum of the first two at once; a lag is an error of a channel, and so is a thrust that no ground bears, or a pull of another unit.
+Scales of all three are told apart in starts and stops (forces.py). Where a tool pulls unmeasured, the thrust follows an unknown force.
 """
 
 from __future__ import annotations
@@ -79,13 +79,7 @@ def _scale_warnings(
     moved = means.change + (0.0 if means.climb is None else means.climb)
     if "acceleration_x" in recording.channels:
         moved = means.of(recording.channels["acceleration_x"])
-    fit = means.fit(thrust, pull + moved)
-    if not fit.is_another_scale:
-        return _pull_scale(means.fit(thrust - moved, pull))
-    return [
-        f"The drive torques over the wheel radius are {fit.slope:.2g} times the drawbar force and the force that moves "
-        f"{vehicle.mass:.4g} kg in this way: check the units of both, the torques' scale {check}."
-    ]
+    return _pull_scale(means.fit(thrust - moved, pull))
 
 
 def _pull_scale(fit: Fit) -> list[str]:
@@ -99,7 +93,7 @@ def _pull_scale(fit: Fit) -> list[str]:
         + (
             f"it may be in {unit}: write 'unit: {unit}' for it in the profile."
             if near
-            else "check its unit and scale."
+            else "check the units and scales of both."
         )
     ]
 

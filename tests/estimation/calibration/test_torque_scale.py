@@ -12,6 +12,7 @@ from terragrip.estimation import identify_torque_scale
 from terragrip.estimation.calibration.torque_scale import _Balance, _jackknife, _window_length
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
+from terragrip.simulation import simulate
 from terragrip.vehicle import Vehicle
 
 Make = Callable[..., Recording]
@@ -23,6 +24,15 @@ def test_from_the_drawbar(drive: Make, vehicle: Vehicle) -> None:
     assert scale.interval[0] < 0.8 < scale.interval[1]
     # Resistance that might grow with slip is considered: no drawbar tells a scale to a per cent.
     assert 0.01 < scale.std < 0.06
+
+
+def test_soils_that_no_label_tells_apart_do_not_make_it_sure_and_wrong() -> None:
+    """A tool that pulls harder where the wheels sink deeper, on four grounds: the scale is 1, and came out as 1.4 to 1.5."""
+    result = simulate("multi1", 31)
+    bare = Recording(result.recording.time, dict(result.recording.channels))
+    scale = identify_torque_scale(bare, result.vehicle)
+    assert scale.interval[0] < 1 < scale.interval[1]
+    assert "'soil' column" in scale.sentence
 
 
 def hilly(rng: np.random.Generator, scale: float, *, push_noise: float, pitch_noise: float) -> Recording:

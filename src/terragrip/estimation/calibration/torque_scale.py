@@ -11,7 +11,8 @@ vehicle's resistance in turns is a term of its own. Resistance that grows with s
 slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would absorb thrust
 itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as it correlates
 with another speed or pull. Resistance that varies with the grade (wet below, dry above) would appear as a larger K, too, the more the grade
-makes of Y: it is in the interval.
+makes of Y: it is in the interval. So is what a fit by short stretches says otherwise where no label tells the soils: a tool pulls harder
+where the wheels sink deeper.
 
 Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
 pitch, each is the other's instrument: K = cov(X, (Y1 + Y2)/2)/cov(Y1, Y2), so errors of either, if unlike, do no harm.
@@ -20,7 +21,7 @@ pitch, each is the other's instrument: K = cov(X, (Y1 + Y2)/2)/cov(Y1, Y2), so e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +46,7 @@ _MOST_SLIP = 0.2  # beyond, resistance grows faster; much less leaves out the st
 _SLOPE = float(np.radians(0.5))  # prior of a slope that nothing measures, where the vehicle states none,
 _WITH_PUSH = 0.3  # and of its correlation with pull and acceleration
 _GROUND_WITH_GRADE = 0.006  # prior SD of the part of ρ_s that varies with the grade: .02 from place to place, correlated by .3 as above
+_STRETCH = 6  # windows without labels that may be a soil of their own
 _DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
 _STRONG = 3.0  # the instruments' covariance over its error
@@ -86,12 +88,9 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         )
     table = table.select(used)
     rows = _balance(table, vehicle)
-    weight = np.ones(len(rows.thrust))
-    for _ in range(30):
-        scale, strength, residual = _slope(rows, weight)
-        robust = 1.4826 * float(np.median(np.abs(residual)))
-        weight = np.minimum(1.0, _HUBER * max(robust, 1e-12) / np.maximum(np.abs(residual), 1e-12))
-    error = _jackknife(rows, weight)
+    scale, strength, residual, weight = _fit(rows)
+    by_soil = _by_stretches(table, rows, scale)
+    error = float(np.hypot(_jackknife(rows, weight), by_soil))
     if not strength > _STRONG * _no_strength(rows, weight):
         raise InputError(
             "pull, acceleration and slope vary too little to determine the torque scale",
@@ -106,6 +105,8 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     by_grade = _with_grade(vehicle, rows, weight)
     if by_grade > max(error / scale, considered):
         sentence += "; a resistance that varies with the grade would look the same: pull changing loads on level ground"
+    if by_soil > 0.1 * scale:
+        sentence += "; soils of unlike resistance would look the same: give a 'soil' column, or pull changing loads on one soil"
     std = float(np.hypot(error, scale * np.hypot(considered, by_grade)))
     if NORMAL_95 * std > abs(scale):
         raise InputError(
@@ -114,6 +115,25 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
             hint="pull changing loads on level ground, or give pitch or acceleration_x",
         )
     return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
+
+
+def _fit(rows: _Balance) -> tuple[float, float, Floats, Floats]:
+    """K, the strength and the residual as of `_slope`, and the weights, by iterated weighting."""
+    weight = np.ones(len(rows.thrust))
+    for _ in range(30):
+        scale, strength, residual = _slope(rows, weight)
+        robust = 1.4826 * float(np.median(np.abs(residual)))
+        weight = np.minimum(1.0, _HUBER * max(robust, 1e-12) / np.maximum(np.abs(residual), 1e-12))
+    return scale, strength, residual, weight
+
+
+def _by_stretches(table: Windows, rows: _Balance, scale: float) -> float:
+    """How far ``scale`` is from that with a resistance for each short stretch of a log, where no label says which soil it is; else 0."""
+    if any(table.soil):
+        return 0.0
+    stretch = np.arange(len(rows.thrust)) // _STRETCH
+    own = (stretch[:, None] == np.arange(stretch[-1] + 1)).astype(float)
+    return abs(_fit(replace(rows, nuisance=np.column_stack([rows.nuisance, own])))[0] - scale)
 
 
 def _with_grade(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
