@@ -212,3 +212,36 @@ def test_many_logs_and_one_file_is_refused(place: Path, capsys: pytest.CaptureFi
     assert "is one file for 3 logs; name a folder" in capsys.readouterr().err
     assert main(["estimate", "--vehicle", str(place / "vehicle.yaml"), "-o", str(place / "x.parquet")]) == 2
     assert "no log is named" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("clock", [0.0, 1.7e9])
+@pytest.mark.parametrize(("gap", "said"), [(0.1, True), (600.0, False)])
+def test_a_drive_that_was_cut_into_files_is_said(
+    place: Path, capsys: pytest.CaptureFixture[str], clock: float, gap: float, said: bool
+) -> None:
+    """By times that run on; logs that each begin at 0 are drives of their own."""
+    begin = clock
+    for number in range(3):
+        part = log_of(0.1, number)
+        part["time"] += begin
+        part.to_csv(place / f"cut{number}.csv", index=False)
+        begin = part["time"].iloc[-1] + gap
+    logs = [str(place / f"cut{number}.csv") for number in range(3)]
+    assert main(["estimate", *logs, "--vehicle", str(place / "vehicle.yaml"), "-o", str(place / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert ("cut1.csv begins where cut0.csv ends" in printed) is said
+    assert printed.count("make one file of them") == 2 * said
+    assert (
+        main(
+            [
+                "estimate",
+                str(place / "ours"),
+                "--vehicle",
+                str(place / "vehicle.yaml"),
+                "-o",
+                str(place / "own"),
+            ]
+        )
+        == 0
+    )
+    assert "begins where" not in capsys.readouterr().out

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.estimation import DEFAULT, Estimates, RunOptions, estimated
 from terragrip.estimation.export import require_room, require_suffix
 from terragrip.estimation.summary import Tally
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 PathLike = str | os.PathLike[str]
+
+_CUT = 2.0  # s, or three rows, between the files of one drive: what a logger loses when it begins another
+_FEW, _FROM_ZERO = 3, 1.0  # rows; s: a time that begins below it was set anew
 
 
 def estimate_file(
@@ -82,6 +87,28 @@ def estimate_file(
     parts = _observed(_labelled(parts, labels or {}), observe)
     write_parts(_counted(parts, tally, notes) if summary else parts, output)
     return tally.text(notes, os.fspath(output)) if summary else ""
+
+
+def follows(second: PathLike, first: PathLike) -> bool:
+    """Whether the rows of one Parquet file of estimates begin where those of another end: by clock time, or by a time that does not begin
+    anew."""
+    (clock, before), (other, time) = (_times(file) for file in (first, second))
+    if min(len(before), len(time)) < _FEW or (clock is None) != (other is None):
+        return False
+    if clock is None or other is None:
+        between = float(time[0] - before[-1]) if time[0] > _FROM_ZERO else 0.0
+    else:
+        between = other + float(time[0]) - clock - float(before[-1])
+    return 0.0 < between <= max(_CUT, 3 * float(np.median(np.diff(before))))
+
+
+def _times(file: PathLike) -> tuple[float | None, Floats]:
+    """Clock time of time 0 [s since 1970] of a file of estimates, None if it has none, and its time [s]."""
+    import pyarrow.parquet as pq
+
+    zero = Estimates.read_about(file).get("time_zero")
+    time = pq.read_table(os.fspath(file), columns=["time"]).column("time").to_numpy()
+    return None if zero is None else datetime.fromisoformat(zero).timestamp(), time
 
 
 def _labelled(parts: Iterator[Estimates], labels: Mapping[str, str]) -> Iterator[Estimates]:

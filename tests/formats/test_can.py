@@ -288,6 +288,15 @@ def test_asc_stamps_that_count_from_the_event_before(tmp_path: Path) -> None:
     assert np.array_equal(again["GroundBasedMachineSpeed"], whole["GroundBasedMachineSpeed"], equal_nan=True)
 
 
+def test_an_asc_log_without_an_end_is_said_to_be_cut(tmp_path: Path) -> None:
+    """Cut between two lines it has no line without a frame."""
+    log = write_log(tmp_path / "log.asc", drive(1000, 20.0).frames)
+    assert not any("cut" in note for note in read_table(log).notes)
+    lines = log.read_text().splitlines(keepends=True)
+    log.write_text("".join(lines[: len(lines) // 2]))
+    assert any("has no 'End TriggerBlock': it was cut" in note for note in read_table(log).notes)
+
+
 def blanks(data: bytes) -> str:
     return data.hex(" ").upper()
 

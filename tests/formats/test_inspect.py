@@ -56,6 +56,18 @@ def test_names_are_recognised(name: str, size: float, channel: str, unit: str | 
 
 
 @pytest.mark.parametrize(
+    ("name", "side"),
+    [
+        ("Motormoment VL", "motor side, needs the gear ratio"),
+        ("Antriebsmoment VL", "at the wheel (scale 1), or motor side"),
+    ],
+)
+def test_which_side_of_the_gear_a_torque_is_of_is_asked(name: str, side: str) -> None:
+    proposals = propose({name: ramp(20)}, (), {name: "Nm"})
+    assert side in proposals["drive_torque_fl"].give
+
+
+@pytest.mark.parametrize(
     "name", ["cmd_vel_x", "left_wheel_voltage", "odom_wz_std", "fan_speed", "calib_step", "temp_l", "x"]
 )
 def test_other_names_are_left_alone(name: str) -> None:
@@ -261,3 +273,36 @@ def test_a_vehicle_that_does_not_fit_is_not_called_ready(
     out = ["-o", str(tmp_path / "e.parquet"), "--quiet"]
     assert main(["estimate", *words, *out]) == (2 if why else 0)
     assert why in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("driven", "expected"),
+    [
+        (None, "unless the vehicle file says 'driven: false'"),
+        (False, ""),
+        (True, "says is driven: name its column"),
+    ],
+)
+def test_a_wheel_without_a_torque_is_held_against_the_vehicle_file(
+    tmp_path: Path, driven: bool | None, expected: str
+) -> None:
+    wheels = ("fl", "fr", "rl", "rr")
+    frame = pd.DataFrame({"time": 0.1 * np.arange(50), "ground_speed": 1.0 + 0.1 * np.sin(np.arange(50))})
+    for wheel in wheels:
+        frame[f"wheel_speed_{wheel}"] = 3 * frame["ground_speed"]
+    for wheel in wheels[2:]:
+        frame[f"drive_torque_{wheel}"] = 10 + ramp(3)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    vehicle = None
+    if driven is not None:
+        axles = {
+            "front": {"mass": 50, "wheels": ["fl", "fr"], "driven": driven},
+            "rear": {"mass": 50, "wheels": ["rl", "rr"]},
+        }
+        shape = {"wheelbase": 1.0, "center_of_gravity_height": 0.3, "wheel": {"radius": 0.3, "inertia": 0.1}}
+        vehicle = Vehicle.from_dict({"mass": 100, "axles": axles, **shape})
+    said = " ".join(
+        one for one in inspect(tmp_path / "log.csv", vehicle=vehicle).missing if "drive torque" in one
+    )
+    assert expected in said
+    assert bool(said) is bool(expected)

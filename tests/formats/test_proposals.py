@@ -175,6 +175,12 @@ def test_a_wheel_speed_whose_radius_is_no_wheels_is_in_doubt() -> None:
     assert result["wheel_speed_fr"].doubt.startswith("wheel_speed_fl_rads: ")  # of one unit with it
 
 
+def test_noise_at_rest_gives_no_radius() -> None:
+    noise = np.random.default_rng(1).standard_normal((2, 300))
+    columns = {"wheel speed fl [rpm]": 0.3 * noise[0], "ground speed [km/h]": 0.07 * noise[1]}
+    assert not any("radius" in word for word in _propose(columns)["wheel_speed_fl"].evidence)
+
+
 def test_odometry_is_no_ground_speed() -> None:
     result = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
     assert result["ground_speed"].columns == ("gps_speed_mps",)

@@ -169,7 +169,7 @@ def test_a_drive_that_says_nothing_leaves_the_question_mark() -> None:
         for one in proposed(turning, radii, "rpm", ground, TIME, vehicle).values():
             assert one.doubt
     # motors called wheels: their gear ratio looks like cm/s, or like nothing
-    for ratio, said in ((29.0, "in cm/s?"), (17.0, "in any unit")):
+    for ratio, said in ((29.0, "(in cm/s)"), (17.0, "in any unit")):
         turned = {wheel: ratio * one for wheel, one in turning.items()}
         assert said in proposed(turned, radii, "rad/s", GROUND, TIME, vehicle)["wheel_speed_fl"].doubt
 

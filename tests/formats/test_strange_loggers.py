@@ -89,6 +89,9 @@ def test_a_receivers_velocities_in_the_plane_go_together() -> None:
     [
         ("couple roue arrière gauche (N.m)", "drive_torque_rl"),
         ("vitesse roue avant droite (tr/min)", "wheel_speed_fr"),
+        ("Couple AVG (N.m)", "drive_torque_fl"),
+        ("vitesse roue ARD (tr/min)", "wheel_speed_rr"),
+        ("torque avg [Nm]", None),
         ("Raddrehzahl HL [U/min]", "wheel_speed_rl"),
         ("M_Rad_VR (Nm)", "drive_torque_fr"),
         ("Höhe ü. NN [m]", "altitude"),

@@ -125,7 +125,9 @@ def _one_by_one(
     quiet: bool,
 ) -> None:
     """Estimate all drives; those that cannot be are named on standard error, and raise InputError at the end."""
-    faults = []
+    from terragrip.from_log import follows
+
+    faults, before = [], None
     for number, (drive, target) in enumerate(zip(drives, targets, strict=True), 1):
         try:
             text = estimated(drive, target, f"{drive.name} ({number} of {len(drives)})")
@@ -138,6 +140,12 @@ def _one_by_one(
             print(
                 "\n  ".join([f"{drive.name}: {first}", *(line for line in rest if line.startswith("Note: "))])
             )
+            if before is not None and follows(target, before[1]):
+                print(
+                    f"  Note: {drive.name} begins where {before[0].name} ends. If a logger cut one drive into these files, make one file "
+                    "of them (docs: formats#many-logs-at-once): each was estimated as a drive of its own."
+                )
+        before = drive, target
     if not quiet and len(faults) < len(drives):
         print(f"Written to {output}: {len(drives) - len(faults)} of {len(drives)}")
     for fault in faults[:-1]:

@@ -21,6 +21,8 @@ Path = tuple[Floats, Floats, Floats]
 
 _MOST = 300_000  # samples of a column that are looked at
 _SLOWEST = 0.3  # m/s
+_ALIKE = 0.5
+"""Least correlation of two columns' sizes, or share of their product that has one sign, by which they go together."""
 _WINDOW = 2.0  # s over which a path is taken for straight
 SPEED_UNITS = {
     "m/s": 1.0,
@@ -193,22 +195,28 @@ class Evidence:
         )
 
     def ratio(self, upper: str, lower: str) -> tuple[float, float] | None:
-        """Sum of absolute values of one column over that of another where the latter moves, and their correlation."""
+        """Sum of absolute values of one column over that of another where the latter moves, and their correlation.
+
+        None where both are but noise about zero (a vehicle at rest): neither their sizes nor their signs go together.
+        """
         result = self.series(lower)
         if result is None:
             return None
         other = self.at(upper, result[0])
         if other is None:
             return None
-        a, b = np.abs(other), np.abs(result[1])
-        known = np.isfinite(a)
-        a, b = a[known], b[known]
+        known = np.isfinite(other)
+        signed = (other * result[1])[known]
+        a, b = np.abs(other[known]), np.abs(result[1][known])
         if len(b) < 5 or (limit := 0.1 * float(np.quantile(b, 0.95))) <= 0:
             return None
         moving = b > limit
         if moving.sum() < 5 or a[moving].sum() <= 0:
             return None
-        return float(a[moving].sum() / b[moving].sum()), correlation(a, b)
+        alike = correlation(a, b)
+        if alike < _ALIKE and abs(signed[moving].sum()) < _ALIKE * np.abs(signed[moving]).sum():
+            return None
+        return float(a[moving].sum() / b[moving].sum()), alike
 
     def fit(self, name: str, time: Floats, reference: Floats) -> tuple[float, float] | None:
         """Slope of a column over a ``reference`` (m,) at ``time`` (m,), and their correlation."""

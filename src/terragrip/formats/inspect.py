@@ -164,7 +164,7 @@ def inspect(
         ),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         proposals=proposals,
-        missing=tuple(missing_channels(present, stamp is not None, seen.columns)),
+        missing=tuple(missing_channels(present, stamp is not None, seen.columns, machine)),
         warnings=tuple(warnings),
         ready=ready,
         fitting=fits.names,

@@ -97,6 +97,9 @@ def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> Sign
     """The wanted signals of what a file holds."""
     contents = Contents()
     walk(tree, "", contents, 0)
+    if wanted is None:  # nobody has named a run: signals of two must not be mixed
+        later = tuple(f"{name}[{k}]." for name, count in contents.runs.items() for k in range(1, count))
+        contents.signals = {n: one for n, one in contents.signals.items() if not n.startswith(later)}
     notes = [*_notes(contents), *contents.notes]
     if not contents.signals and not contents.loose:
         problem = "; ".join(["has no numeric column", *(note.rstrip(".") for note in notes[:1])])
@@ -136,6 +139,11 @@ def _notes(contents: Contents) -> list[str]:
         notes.append(
             f"Signals of another length than the time vector beside them ({', '.join(map(str, longs[:3]))}) were left out: {odd}."
         )
+    notes += [
+        f"{name} holds {count} drives, each with its own time: {name}[0] is the one that is read, or the one that a profile names "
+        f"({name}[1] ...). Save each in a file of its own to estimate all."
+        for name, count in contents.runs.items()
+    ]
     records = [name for name, kind in contents.opaque.items() if kind == IN_RECORDS]
     if records:
         notes.append(

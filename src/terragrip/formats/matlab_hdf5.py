@@ -33,7 +33,10 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
         kind = item.attrs.get("MATLAB_class", b"")
         return Opaque(kind.decode("ascii", "replace") if isinstance(kind, bytes) else "")
     if isinstance(item, h5py.Group):
-        return {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
+        parts = {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
+        if _is_struct_array(item, parts, h5py):
+            return [dict(zip(parts, one, strict=True)) for one in zip(*parts.values(), strict=True)]
+        return parts
     if not isinstance(item, h5py.Dataset) or "MATLAB_empty" in item.attrs:
         return None
     kind = item.attrs.get("MATLAB_class", b"")
@@ -47,6 +50,17 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
     if item.dtype.kind in "fiub":
         return _array_of_hdf5(item, turned=bool(kind))
     return None
+
+
+def _is_struct_array(group: Any, parts: dict[str, Any], h5py: Any) -> bool:
+    """Whether a group is an array of structs: each field a reference an element, which in a cell would say that it is one."""
+    fields = list(group.values())
+    lengths = {len(part) if isinstance(part, list) else 0 for part in parts.values()}
+    return (
+        len(lengths) == 1
+        and lengths != {0}
+        and all(isinstance(field, h5py.Dataset) and "MATLAB_class" not in field.attrs for field in fields)
+    )
 
 
 def _array_of_hdf5(item: Any, *, turned: bool) -> Array:

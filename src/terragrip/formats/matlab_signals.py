@@ -33,7 +33,7 @@ class Contents:
     """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; ``loose`` vectors without
     a clock; ``odd`` ones of another length than their clock, with both lengths.
 
-    ``notes`` say which of several vectors was taken for time.
+    ``runs``: arrays of drives, and how many they hold; ``notes`` say which of several vectors was taken for time.
     """
 
     signals: dict[str, tuple[Any, Any, int | None]] = field(default_factory=dict)
@@ -42,6 +42,7 @@ class Contents:
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
     odd: dict[str, tuple[int, int]] = field(default_factory=dict)
+    runs: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
@@ -54,9 +55,20 @@ def walk(value: Any, name: str, contents: Contents, depth: int, above: Any = Non
     elif isinstance(value, Mapping):
         _walk_struct(value, name, contents, depth, above)
     elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
-        for k, part in enumerate(list(np.ravel(value)) if isinstance(value, np.ndarray) else value):
+        parts = list(np.ravel(value)) if isinstance(value, np.ndarray) else value
+        if len(parts) > 1 and all(_is_run(part, parts[0]) for part in parts):
+            contents.runs[name] = len(parts)
+        for k, part in enumerate(parts):
             own = _own_name(part)
             walk(part, _joined(name, own) if own else f"{name}[{k}]", contents, depth + 1, above)
+
+
+def _is_run(part: Any, first: Any) -> bool:
+    """Whether a struct has a time of its own and the signals of the first: one drive of several."""
+    if not isinstance(part, Mapping) or _own_name(part) or part.keys() != first.keys():
+        return False
+    vectors = [key.lower() for key in part if _is_vector(part[key])]
+    return len(vectors) > 2 and any(key in _TIMES for key in vectors)
 
 
 def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Any) -> None:
@@ -118,14 +130,6 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, conte
     parts = (
         [signals] if isinstance(signals, Mapping) else list(np.ravel(signals)) if _is_list(signals) else []
     )
-    if isinstance(signals, Mapping) and isinstance(
-        signals.get("values"), list
-    ):  # a struct array of version 7.3
-        rows = len(signals["values"])
-        parts = [
-            {key: part[k] for key, part in signals.items() if _is_list(part) and len(part) == rows}
-            for k in range(rows)
-        ]
     is_used = False
     for k, part in enumerate(parts):
         if (

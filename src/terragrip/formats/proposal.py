@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -12,8 +13,13 @@ from terragrip.formats.recognition import Proposal
 from terragrip.recording import Recording
 from terragrip.recording.schema import has_torque, wheel_names_in
 
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
 
-def missing_channels(proposals: Collection[str], has_time: bool, columns: Collection[str] = ()) -> list[str]:
+
+def missing_channels(
+    proposals: Collection[str], has_time: bool, columns: Collection[str] = (), vehicle: Vehicle | None = None
+) -> list[str]:
     """What is not among the channels that were found, and what follows, as sentences; ``columns`` are the log's."""
     notes = [] if has_time else ["No time column was found: it is needed, in increasing seconds."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
@@ -40,7 +46,14 @@ def missing_channels(proposals: Collection[str], has_time: bool, columns: Collec
             "soil resistance, net traction, efficiency and soil curves cannot."
         )
         return notes
-    notes += [f"No drive torque was found for wheel {wheel}: its axle must be undriven." for wheel in without]
+    driven = {} if vehicle is None else dict(zip(vehicle.wheels, vehicle.driven, strict=True))
+    notes += [
+        f"No drive torque was found for wheel {wheel}, which the vehicle file says is driven: name its column in a profile."
+        if wheel in driven
+        else f"No drive torque was found for wheel {wheel}: estimates need it, unless the vehicle file says 'driven: false' for its axle."
+        for wheel in without
+        if driven.get(wheel, True)
+    ]
     if "drawbar_force" not in proposals:
         notes.append("No drawbar force was found: the vehicle is assumed to tow nothing.")
     if "acceleration_x" not in proposals:

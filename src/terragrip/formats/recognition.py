@@ -29,6 +29,8 @@ Texts = Mapping[str, npt.NDArray[Any]]
 SURE = 0.7
 """Confidence from which a proposal carries no question mark."""
 
+_EITHER_SIDE = re.compile(r"^(?!.*mot).*antrieb", re.IGNORECASE)  # the drive: before the gear or behind it
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -199,6 +201,8 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         entry |= {"scale": 1.0} | ({"unit": unit} if unit and unit != target else {})
         turns = "wheel turns per motor turn" if channel.startswith("wheel") else "motor turns per wheel turn"
         give = f"motor side, needs the gear ratio: the scale is {turns}"
+        if _EITHER_SIDE.match(guess.column.column):
+            give = f"at the wheel (scale 1), or motor side, which needs the gear ratio: the scale is {turns}"
     if target is not None and guess.sign < 0:
         entry["sign"] = -1
     return Proposal(

@@ -66,10 +66,10 @@ class RimUnit:
         """What was found, by the ``radius`` [m] of a wheel."""
         if not self.possible:
             return f"with a radius of {radius:.3g} m the rims are not as fast as {self.ground} in any unit"
-        parts = [f"{1 / share:.2f} times in {unit}" for unit, share in self.possible.items()]
+        parts = [f"{1 / share:.2f} times (in {unit})" for unit, share in self.possible.items()]
         axles = ", as the unequal wheels of two axles also show" if self.shown_by_axles else ""
         only = ", in no other unit near it" if self.is_sure and not self.shown_by_axles else ""
-        return f"with a radius of {radius:.3g} m the rims go as fast as {self.ground} {' or '.join(parts)}{only}{axles}"
+        return f"with a radius of {radius:.3g} m the rims go {' or '.join(parts)} as fast as {self.ground}{only}{axles}"
 
     def judge(self, guess: Guess, radius: float) -> Guess:
         """The guess with this unit: surer where no other is possible, with a question mark where one is."""

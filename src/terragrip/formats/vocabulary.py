@@ -73,6 +73,9 @@ _CORNERS = {
     **dict.fromkeys(("fl", "lf", "vl"), "fl"), **dict.fromkeys(("fr", "rf", "vr"), "fr"),
     **dict.fromkeys(("rl", "lr", "bl", "hl"), "rl"), **dict.fromkeys(("rr", "br", "hr"), "rr"),
 }  # fmt: skip
+_FRENCH_CORNERS = {"avg": "fl", "avd": "fr", "arg": "rl", "ard": "rr"}
+_FRENCH = ("roue", "couple", "vitesse", "regime")
+"""Beside one of these words ``avg`` is *avant gauche*; elsewhere it is an average."""
 UNIT_WORDS = {
     "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
     "dps": "deg/s", "degs": "deg/s", "rads": "rad/s", "deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad",
@@ -347,9 +350,10 @@ def _settled(concepts: set[str]) -> frozenset[str]:
 
 def _wheel_of(words: list[str], last: list[str], concepts: set[str]) -> str:
     """The wheel that a name speaks of: a corner, a side with or without its end, or a number; empty if none."""
+    corners = _CORNERS | _FRENCH_CORNERS if not set(_FRENCH).isdisjoint(words) else _CORNERS
     for word in words:
-        if word in _CORNERS:
-            return _CORNERS[word]
+        if word in corners:
+            return corners[word]
     side = "l" if "left" in concepts else "r" if "right" in concepts else ""
     end = "f" if "front" in concepts else "r" if "rear" in concepts else ""
     number = next((word for word in last if word.isdigit() and 1 <= int(word) <= 8), "")

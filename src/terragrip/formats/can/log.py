@@ -145,7 +145,7 @@ def _text_by_python_can(
 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
         numbered: Iterator[Numbered] = enumerate(lines, 1)
-        own = asc_lines(numbered, frames) if reader == "ASCReader" else numbered
+        own = asc_lines(numbered, frames, count) if reader == "ASCReader" else numbered
         return by_python_can(getattr(can, reader)(io.StringIO()), own, count, (*DAMAGE, can.CanError))
 
     return _from_lines(path, kind, wanted, databases, parse)
@@ -179,6 +179,10 @@ def _from_lines(
     if count.bad:
         what = "1 line has no frame:" if count.bad == 1 else f"{count.bad} lines have no frame, the first is"
         notes.append(f"{what} line {count.first} ({count.shown!r}); left out.")
+    if count.begun:
+        notes.append(
+            "The log has no 'End TriggerBlock': it was cut, or its logger was, and the drive may have gone on."
+        )
     scale = 1.0
     span = last - (frames.first or 0.0)
     if (

@@ -94,12 +94,14 @@ def lines_are_like(head: bytes, form: re.Pattern[str]) -> bool:
 
 @dataclass
 class Count:
-    """How many lines of a text log held no frame and were no known remark, and the first of them."""
+    """How many lines of a text log held no frame and were no known remark, and the first of them; ``begun``: a measurement has begun
+    and not ended."""
 
     bad: int = 0
     first: int = 0
     shown: str = ""
     unstamped: bool = False
+    begun: bool = False
 
     def add(self, number: int, line: str) -> None:
         """Count a line."""
@@ -211,10 +213,11 @@ def by_python_can(
         count.add(number, shown)
 
 
-def asc_lines(lines: Iterable[Numbered], frames: Frames) -> Iterator[Numbered]:
+def asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Iterator[Numbered]:
     """The lines of an ASC log, for python-can to read, but those of frames that ``frames`` has no use for and counts.
 
-    Stamps that count from the event before ("timestamps relative") are made to count from the start.
+    Stamps that count from the event before ("timestamps relative") are made to count from the start. ``count`` learns whether the log has
+    an end.
     """
     unwanted: dict[str, int | None] = {}
     base, relative, now = 16, False, 0.0
@@ -222,6 +225,8 @@ def asc_lines(lines: Iterable[Numbered], frames: Frames) -> Iterator[Numbered]:
         cells = line.split(None, 3)
         if cells and cells[0].lower() == "base":
             base, relative = 10 if "dec" in line.lower() else 16, "relative" in line.lower()
+        if cells and cells[0].lower() in ("begin", "end") and "trigger" in line.lower():
+            count.begun = cells[0].lower() == "begin"
         if relative and cells and _STAMP.fullmatch(cells[0]):
             now += float(cells[0])
             line = f"{now:.6f} {line.lstrip().partition(' ')[2]}"

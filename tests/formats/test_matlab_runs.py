@@ -1,0 +1,61 @@
+"""Arrays of structs in MATLAB files, each a drive of its own, of both versions: one is read, and the notes say so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from terragrip.formats import Profile, inspect, read
+
+FIELDS = ("time", "ground_speed", "wheel_speed_fl", "wheel_speed_fr")
+
+
+def run(number: int) -> dict[str, np.ndarray]:
+    time = 0.1 * np.arange(400 + number)
+    speed = 1 + 0.3 * np.sin(time / 5 + number)
+    return dict(zip(FIELDS, (time, speed, 3.5 * speed, 3.5 * speed), strict=True))
+
+
+def version_5(path: Path) -> None:
+    runs = np.zeros((1, 3), dtype=[(name, object) for name in FIELDS])
+    for k in range(3):
+        for name, values in run(k).items():
+            runs[0, k][name] = values
+    savemat(path, {"runs": runs})
+
+
+def version_73(path: Path) -> None:
+    """As MATLAB writes it: a dataset of references for each field."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group, kept = file.create_group("runs"), file.create_group("#refs#")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name in FIELDS:
+            field = group.create_dataset(name, (3, 1), dtype=h5py.ref_dtype)
+            for k in range(3):
+                one = kept.create_dataset(f"{name}{k}", data=run(k)[name][None, :])
+                one.attrs["MATLAB_class"] = np.bytes_("double")
+                field[k, 0] = one.ref
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+@pytest.mark.parametrize("write", [version_5, version_73])
+def test_of_several_drives_the_first_is_proposed_whole_and_another_can_be_named(
+    tmp_path: Path, write
+) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "runs.mat"
+    write(path)
+    seen = inspect(path)
+    assert {name for columns in seen.recognised.values() for name in columns} == {
+        f"runs[0].{n}" for n in FIELDS[1:]
+    }
+    (note,) = [one for one in seen.warnings if "runs holds 3 drives" in one]
+    assert "Save each in a file of its own" in note
+    channels = {name: {"from": f"runs[2].{name}"} for name in FIELDS[1:]}
+    second = read(path, Profile.from_dict({"time": {"from": "time"}, "channels": channels}))
+    np.testing.assert_allclose(second.channels["ground_speed"], run(2)["ground_speed"])
+    assert any("runs holds 3 drives" in one for one in second.notes)
