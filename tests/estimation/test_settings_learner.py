@@ -89,3 +89,16 @@ def test_it_goes_on_from_its_state_to_the_last_digit(log: Recording) -> None:
         before = learned_by(first, log.select(slice(0, row)))
         second.restore(json.loads(json.dumps(first.state())))
         assert before | learned_by(second, log, row) == whole
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1.0, ""), (3.6, "ground_speed may be in km/h"), (0.1047, "in rpm")]
+)
+def test_a_ground_speed_in_another_unit_is_named_once_it_was_found_twice(
+    log: Recording, factor: float, said: str
+) -> None:
+    wrong = log.with_channels(ground_speed=factor * log["ground_speed"])
+    out = learned_by(SettingsLearner(robot(sensors=UNKNOWN), tuple(log.channels), {}, {}), wrong)
+    doubts = {row: learned.doubts for row, learned in out.items() if learned.doubts}
+    assert list(doubts) == ([2000] if said else [])
+    assert all(said in text for texts in doubts.values() for text in texts)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import struct
 
 import numpy as np
 import pandas as pd
@@ -11,7 +13,7 @@ import pytest
 from terragrip.errors import InputError
 from terragrip.formats import Profile
 from terragrip.live.decode import Decoder
-from terragrip.live.payload import Unreadable, from_json
+from terragrip.live.payload import Unreadable, from_json, unpacker
 
 PROFILE = {
     "time": {"from": "t", "unit": "ms"},
@@ -137,3 +139,18 @@ def test_json_lines_are_samples():
 def test_a_message_of_the_time_alone_is_no_sample_however_often_it_comes():
     decoder = Decoder(None)
     assert [decoder.samples({"time": float(k)}) for k in range(3)] == [[], [], []]
+
+
+def test_numbers_of_the_other_byte_order_are_named() -> None:
+    payload = Profile.from_dict(
+        {
+            "payload": {"format": "doubles", "fields": ["t", "fl", "fr", "v"]},
+            "time": {"from": "t"},
+            "channels": {"ground_speed": "v", "wheel_speed_fl": "fl", "wheel_speed_fr": "fr"},
+        }
+    ).payload
+    unpack = unpacker(payload)
+    for sample in ((0.02, 2.61, 2.58, 0.5), (1e9, math.nan, 1e-200, 0.0), (3.0, 1e300, 2.0, 1.0)):
+        assert unpack(struct.pack("<4d", *sample))[0]["t"] == sample[0]
+    with pytest.raises(Unreadable, match="byte_order"):
+        unpack(struct.pack(">4d", 0.02, 2.61, 2.58, 0.5))

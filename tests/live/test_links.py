@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import itertools
 import json
 import os
 import struct
+import threading
 
 import pytest
 from mcap.exceptions import EndOfFile
@@ -21,6 +23,7 @@ from terragrip.formats import Profile
 from terragrip.live.options import Options
 from terragrip.live.schemas import NAMES
 from terragrip.live.service import Service
+from terragrip.live.thread_bridge import repeated_in_thread
 
 pytestmark = pytest.mark.asyncio
 
@@ -176,7 +179,8 @@ async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle,
     sent = messages(short.recording, len(short.recording))
     async with (
         running(service),
-        connect(f"ws://127.0.0.1:{port}", subprotocols=["foxglove.sdk.v1"]) as client,
+        # no bound on what waits to be read: behind it, closing would wait for ten seconds
+        connect(f"ws://127.0.0.1:{port}", subprotocols=["foxglove.sdk.v1"], max_queue=None) as client,
     ):
         channels = {}
         while len(channels) < len(NAMES):
@@ -316,3 +320,41 @@ async def test_a_receiver_on_a_serial_line(vehicle, port):
     rows = [message.row for message in service.seen if message.kind == "estimate"]
     assert rows[0].values["ground_speed"] == pytest.approx(2.0 * 1852 / 3600)
     assert rows[0].values["latitude"] == pytest.approx(48 + 7.038 / 60)
+
+
+async def test_a_receiver_without_a_fix_and_one_at_another_baud_rate_are_named(vehicle):
+    machine, device = os.openpty()
+    service = Service(vehicle, [f"serial:{os.ttyname(device)}"])
+    async with running(service):
+        while not events(service, "source_lost"):
+            os.write(machine, sentence("GPRMC,123500,V,,,,,,,230394,,,N"))
+            await asyncio.sleep(0.1)
+        os.write(machine, b"\xff\x81" * 300)
+        await until(lambda: events(service, "unreadable"))
+    os.close(device)
+    os.close(machine)
+    assert "no fix" in events(service, "source_lost")[0]
+    assert "baud" in events(service, "unreadable")[0]
+
+
+async def test_a_device_that_goes_while_the_service_ends_prints_no_traceback():
+    begun, gone, said = threading.Event(), threading.Event(), []
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: said.append(context))
+
+    def read():
+        begun.set()
+        gone.wait()
+        raise OSError("unplugged")
+
+    task = asyncio.create_task(repeated_in_thread(read))
+    await asyncio.to_thread(begun.wait)
+    task.cancel()
+    await asyncio.sleep(0)
+    gone.set()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+    del task
+    for _ in range(3):  # the loop lets go of what it has called
+        await asyncio.sleep(0)
+        gc.collect()
+    assert said == []

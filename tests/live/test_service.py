@@ -8,6 +8,7 @@ import inspect
 import json
 import socket
 import struct
+import time
 from collections import deque
 
 import numpy as np
@@ -324,3 +325,25 @@ async def test_a_warning_of_the_estimator_is_an_event_once(vehicle, short, monke
     (text,) = events(service, "immobilization")
     assert text.startswith("about to dig in: ground speed 0.6")
     assert "slip up to" in text
+
+
+async def test_a_time_in_milliseconds_is_named(vehicle, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    speeds = dict.fromkeys([f"wheel_speed_{w}" for w in vehicle.wheels], 3.0) | {"ground_speed": 0.55}
+    async with running(service):
+        while not events(service, "units"):
+            sender.send({"time": time.time() * 1000, **speeds})
+            await asyncio.sleep(0.02)
+    (said,) = events(service, "units")
+    assert "unit: ms" in said
+    assert "rows estimated" in service.summary()  # no date has a year that large
+
+
+async def test_wheels_by_other_names_are_named_and_no_slip_is_claimed(vehicle, port, sender):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        for k in range(30):
+            sender.send({"time": 0.01 * k, "w_fl": 3.0, "drawbar_force": 100.0})
+        await until(lambda: service.core.rows == 30)
+    assert "what comes is drawbar_force" in events(service, "schema")[0]
+    assert "no wheel's speed came" in service.summary()

@@ -31,11 +31,15 @@ WORTH = 0.1
 
 @dataclass(frozen=True)
 class Learned:
-    """SDs [SI] by channel and update periods [s], as learned from ``seconds`` of kept rows of the drive so far."""
+    """SDs [SI] by channel and update periods [s], as learned from ``seconds`` of kept rows of the drive so far.
+
+    ``doubts``: sentences on speeds that are likely in another unit, once two evaluations in a row have found them.
+    """
 
     noise: Mapping[str, float]
     held: Mapping[str, float]
     seconds: float
+    doubts: tuple[str, ...] = ()
 
     def changes(self, estimator: TractionEstimator) -> list[str]:
         """What differs from what the estimator uses, in words; empty where nothing is worth a change."""
@@ -73,6 +77,7 @@ class SettingsLearner:
         self._missing = (math.nan,) * len(channels)
         self._number = 0  # of the chunk that is open
         self._every = 1
+        self._doubtful = 0  # evaluations in a row that found a speed in another unit
         self._open = array("d")  # rows one behind the other: time, then the channels
         self._began = math.nan
         self._rows = 0
@@ -121,6 +126,7 @@ class SettingsLearner:
         import numpy as np
 
         from terragrip.recording import Recording, held_periods
+        from terragrip.recording.plausibility import speed_warnings
 
         table = np.concatenate([np.frombuffer(rows) for rows in self._kept.values()])
         table = table.reshape(-1, 1 + len(self._channels))
@@ -130,13 +136,16 @@ class SettingsLearner:
         held = {**held_periods(log), **self._held}
         noise, _ = settings_in(log, self._vehicle, sensors=self._noise, held=held)
         seconds = sum(rows[-1 - len(self._channels)] - rows[0] for rows in self._kept.values())
-        return Learned(noise, held, seconds)
+        doubts = speed_warnings(log, self._vehicle)
+        self._doubtful = self._doubtful + 1 if doubts else 0
+        return Learned(noise, held, seconds, tuple(doubts) if self._doubtful == 2 else ())
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it, to the last bit; without what was given."""
         return {
             "number": self._number,
             "every": self._every,
+            "doubtful": self._doubtful,
             "began": None if math.isnan(self._began) else self._began,
             "rows": self._rows,
             "open": _text(self._open),
@@ -146,6 +155,7 @@ class SettingsLearner:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from `state`, made by one of the same channels; raises ValueError or LookupError where it is none."""
         self._number, self._every, self._rows = state["number"], state["every"], state["rows"]
+        self._doubtful = state.get("doubtful", 0)
         self._began = math.nan if state["began"] is None else state["began"]
         self._open = _numbers(state["open"])
         self._kept = {int(number): _numbers(text) for number, text in state["kept"].items()}

@@ -19,9 +19,28 @@ AGREEMENT = 1.0  # s, and how closely in s leads must agree
 LOSS = 10.0  # s after samples were dropped, in which stamps may lead on by any step
 SYNCHRONISED = 1.0  # s: stamps this close to the machine's clock are on it already
 _WAITING = 5000
+_MARKS, _APART, _TOO_FAST = 4, 0.5, 50.0  # of `Pace`: marks, s between them, s a second
 
 Values = dict[str, float]
 Stamped = tuple[float, float, Values]  # arrival, time (or stamp while waiting), values
+
+
+@dataclass(slots=True)
+class Pace:
+    """How fast a source's stamps advance in its first seconds, by arrivals: a time in milliseconds runs 1000 times too fast."""
+
+    marks: list[tuple[float, float]] = field(default_factory=list)  # arrival, stamp
+
+    def wrong(self, arrival: float, stamp: float) -> float | None:
+        """Seconds of stamps in a second of arrivals, where four marks half a second apart agree on far too many; once."""
+        if len(self.marks) == _MARKS or (self.marks and arrival - self.marks[-1][0] < _APART):
+            return None
+        self.marks.append((arrival, stamp))
+        if len(self.marks) < _MARKS:
+            return None
+        pairs = zip(self.marks, self.marks[1:], strict=False)
+        paces = [(later[1] - one[1]) / (later[0] - one[0]) for one, later in pairs]
+        return paces[-1] if min(paces) > _TOO_FAST and max(paces) < 2 * min(paces) else None
 
 
 @dataclass(slots=True)

@@ -20,7 +20,7 @@ from terragrip.estimation.estimator import Estimate, TractionEstimator, default_
 from terragrip.estimation.learning import SettingsLearner
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.rims import DRIVE, speeds_alone
-from terragrip.live.clock import SourceClock, Stamped
+from terragrip.live.clock import Pace, SourceClock, Stamped
 from terragrip.live.counts import Counts
 from terragrip.live.event import Event
 from terragrip.live.reorder import Pending, Reorder
@@ -129,6 +129,7 @@ class Core:
         self.reorder = Reorder(settings.window, self.counts)
         align = len(settings.sources) > 1
         self.clocks = [SourceClock(align) for _ in settings.sources]
+        self._paces = [Pace() for _ in settings.sources]
         self.estimator: TractionEstimator | None = None
         self.learner: SettingsLearner | None = None
         self.rows = 0
@@ -179,6 +180,10 @@ class Core:
         """A sample of ``source`` (its place in the settings), stamped by its own clock [s]; SI values by column."""
         self.counts.add("received", values)
         out: list[Output] = []
+        pace = self._paces[source].wrong(arrival, stamp)
+        if pace is not None:
+            text = f"time advances by {pace:.3g} s in a second: state its unit in a profile, 'time: {{from: ..., unit: ms}}'"
+            out.append(Event(self.time, "units", self.settings.sources[source], text))
         accepted, refused, jump = self.clocks[source].place(arrival, stamp, values)
         if refused:
             self._refuse_stamps(source, refused, out)
@@ -252,6 +257,8 @@ class Core:
         """Noise and held channels by the rows so far, from the next row on, with an event."""
         taken = estimator.converted if isinstance(estimator, EngineEstimator) else row.values
         learned = learner.add(row.time, taken)
+        if learned is not None:
+            out += [Event(row.time, "units", "estimator", doubt) for doubt in learned.doubts]
         changes = learned.changes(estimator) if learned is not None else []
         if learned is None or not changes:
             return
@@ -298,6 +305,8 @@ class Core:
         text = f"no speed of the wheel {', '.join(absent)} yet"
         if strange:
             text += f"; the vehicle has no wheel {', '.join(strange[:4])}"
+        elif not wheels:
+            text += f"; what comes is {', '.join(sorted(seen))}: a profile maps other names"
         return [Event(first.time, "schema", self.settings.sources[first.parts[0][0]], text)]
 
     def _seen(self, first: Pending) -> Collection[str]:

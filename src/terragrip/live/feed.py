@@ -41,6 +41,7 @@ class Feed:
         self.after = after  # newest stamp that the record holds: a replay goes on behind it
         self.messages = self.unreadable = 0
         self.is_lost = False
+        self.excuse = ""  # why nothing comes although the other side sends
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
         self._unpack = unpack
         self._last_events: dict[str, float] = {}

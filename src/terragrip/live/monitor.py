@@ -118,8 +118,9 @@ def add_sinks(page: Metrics, outboxes: Sequence[Outbox]) -> None:
 
 def _silent(pulse: Pulse, now: float) -> str | None:
     silence = pulse.silence(now)
+    why = f": {pulse.feed.excuse}" if pulse.feed.excuse else ""
     if not pulse.has_begun:
-        return f"nothing has come from {pulse.feed.name} yet"
+        return f"nothing has come from {pulse.feed.name} yet{why}"
     if silence > max(FLOOR, 2.0 * pulse.period):
-        return f"nothing came from {pulse.feed.name} for {silence:.1f} s"
+        return f"nothing came from {pulse.feed.name} for {silence:.1f} s{why}"
     return None

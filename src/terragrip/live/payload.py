@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from typing import Any
 
 from terragrip.formats.payload import Payload
 
 Fields = dict[str, Any]
+_TINY, _HUGE = 1e-20, 1e20  # no machine measures beyond; states of a filter that decay may be smaller
 
 
 class Unreadable(Exception):
@@ -27,9 +29,23 @@ def unpacker(payload: Payload | None) -> Unpack:
     def unpack(data: bytes) -> list[Fields]:
         if len(data) % packer.size or not data:
             raise Unreadable(f"{len(data)} bytes, not a multiple of {packer.size}")
-        return [dict(zip(names, values, strict=True)) for values in packer.iter_unpack(data)]
+        samples = [dict(zip(names, values, strict=True)) for values in packer.iter_unpack(data)]
+        largest = _of_other_order(samples[0])
+        if largest:
+            raise Unreadable(
+                f"numbers up to {largest:.2g}: is byte_order in the profile's payload the sender's?"
+            )
+        return samples
 
     return unpack
+
+
+def _of_other_order(fields: Fields) -> float:
+    """The largest of numbers that look like those of the other byte order: most are far too large or too small, one too large. Else 0."""
+    sizes = [abs(value) for value in fields.values() if value and math.isfinite(value)]
+    strange = [size for size in sizes if not _TINY < size < _HUGE]
+    largest = max(strange, default=0.0)
+    return largest if largest > _HUGE and 2 * len(strange) > len(sizes) else 0.0
 
 
 def from_json(data: bytes) -> list[Fields]:

@@ -18,6 +18,7 @@ from terragrip.recording.columns import SINCE_1970
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
 _EVERY = 5.0  # s between two events that estimates are behind
+_TURNING = ("wheel_speed_", "wheel_based_speed", "engine_speed")
 
 
 class Statistics:
@@ -108,7 +109,7 @@ class Statistics:
             silence = pulse.silence(now)
             if silence > max(_SILENT, 10.0 * self.period, 2.0 * pulse.period):
                 pulse.is_silent = True
-                feed.lost(f"nothing came for {silence:.1f} s")
+                feed.lost(f"{feed.excuse or 'nothing came'} for {silence:.1f} s")
 
     def second(self, now: float) -> bool:
         """Whether a second is over; then its rates are worked out."""
@@ -150,6 +151,8 @@ class Statistics:
         core = self._core
         last = clock_text(round(core.time, 3)) if core.time > SINCE_1970 else f"{core.time:.6g} s"
         lines = [f"{core.rows} rows estimated" + (f", up to {last}" if core.rows else "")]
+        if core.rows and not any(name.startswith(_TURNING) for name in core.counts.by_channel):
+            lines.append("no wheel's speed came: there is no slip or traction in these rows")
         for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):
             by = {name: mine[fate] for name, mine in core.counts.by_channel.items() if mine[fate]}
             if by:

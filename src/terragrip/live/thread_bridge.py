@@ -55,3 +55,5 @@ async def repeated_in_thread(work: Callable[[], None]) -> None:
     finally:
         done.set()
         await asyncio.wait([reader])
+        if not reader.cancelled():
+            reader.exception()  # of one that was lost while it was cancelled nobody asks, and asyncio would print it

@@ -46,7 +46,11 @@ class SerialSource:
             nonlocal rest
             rest += line.read(max(1, line.in_waiting))
             *whole, rest = rest.split(b"\n")
-            rest = rest[-_LONGEST:]
+            if len(rest) > _LONGEST:
+                rest = b""
+                bridge.call(
+                    feed.reject, f"no line in {_LONGEST} bytes: is the receiver's baud rate {self.baud}?"
+                )
             for sentence in whole:
                 bridge.call(self._feed, feed, sentence)
 
@@ -66,5 +70,6 @@ class SerialSource:
             if sentence.kind == "VTG" and self._has_rmc:
                 continue  # it repeats the speed of RMC
             self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
+            feed.excuse = "" if sentence.has_fix else "its sentences have no fix"
             if sentence.fields:
                 feed.fields(sentence.fields)
