@@ -59,13 +59,18 @@ def drive_of(seed: int, day: str, seconds: float) -> str:
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
+    """`furnished`, for one test."""
+    return furnished(tmp_path)
+
+
+def furnished(place: Path) -> Path:
     """Two vehicle files and six logs of three days in two folders."""
     for name in ("Heros", "Thorvald"):
-        (tmp_path / f"{name}.yaml").write_text(VEHICLE.format(name=name))
+        (place / f"{name}.yaml").write_text(VEHICLE.format(name=name))
     for number in range(6):
-        folder = tmp_path / "logs" / ("a" if number < 3 else "b")
+        folder = place / "logs" / ("a" if number < 3 else "b")
         write_log(folder / f"drive{number}.csv", number, f"2026-05-0{1 + number // 2}")
-    return tmp_path
+    return place
 
 
 QUIET = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,11 +17,12 @@ import pyarrow.parquet as pq
 import pytest
 
 import terragrip as tg
-from small_fleet import VEHICLE, call, fleet, whole, write_log
+from small_fleet import VEHICLE, call, fleet, furnished, whole, write_log
 from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.files import lock
+from terragrip.fleet.cluster import Pool
 from terragrip.fleet.dataset import known_notes, settled, write_tables
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.run import FleetResult
@@ -52,6 +54,22 @@ def ran(
         return code, said.out, said.err
 
     return run
+
+
+@pytest.fixture(scope="module")
+def first_call(tmp_path_factory: pytest.TempPathFactory, scheduler: str) -> Path:
+    """The data set of a call on the logs of `place`; not to be changed."""
+    place = furnished(tmp_path_factory.mktemp("first_call"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("terragrip.soil.learn._compared", lambda _: None)  # as `ran`
+        assert main(call(place, "--scheduler", scheduler, "--quiet")) == 0
+    return place / "out"
+
+
+@pytest.fixture
+def estimated(place: Path, first_call: Path) -> Path:
+    """`place/out`, as a first call left it: a log is known by its content, wherever it lies."""
+    return shutil.copytree(first_call, place / "out")
 
 
 def written(out: Path) -> dict[str, int]:
@@ -146,15 +164,16 @@ def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
     assert "drive4.csv" in row
 
 
-def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path, ran: Ran) -> None:
-    assert ran()[0] == 0
-    first = written(place / "out")
+def test_a_second_call_does_what_is_new_or_changed_and_no_more(
+    place: Path, estimated: Path, ran: Ran
+) -> None:
+    first = written(estimated)
     write_log(place / "logs/b/drive6.csv", 6)
     write_log(place / "logs/a/drive0.csv", 60)
     code, said, _ = ran()
     assert code == 0
     assert "2 estimated, 5 unchanged, 0 failed" in said
-    second = written(place / "out")
+    second = written(estimated)
     assert {name for name in second if second[name] != first.get(name)} == {
         "drive0.csv.parquet",
         "drive6.csv.parquet",
@@ -165,30 +184,29 @@ def test_a_second_call_does_what_is_new_or_changed_and_no_more(place: Path, ran:
     code, said, _ = ran()
     assert "6 estimated, 0 unchanged, 0 failed" in said
     assert "1 log of earlier calls is kept." in said
-    rows, _ = whole(place / "out")
+    rows, _ = whole(estimated)
     assert len(rows) == 7
-    vehicles = pd.read_parquet(place / "out/summary.parquet").set_index("log")["vehicle"]
+    vehicles = pd.read_parquet(estimated / "summary.parquet").set_index("log")["vehicle"]
     assert vehicles.pop("drive6.csv") == "Heros"
     assert set(vehicles) == {"Heros 2"}
 
 
 def test_a_log_that_cannot_be_read_stops_no_other_and_leaves_when_it_is_whole_again(
-    place: Path, ran: Ran
+    place: Path, estimated: Path, ran: Ran
 ) -> None:
     broken = place / "logs/a/drive1.csv"
     content = broken.read_bytes()
-    assert ran()[0] == 0
     broken.write_bytes(b"\x00\xff" * 500)
     code, said, errors = ran()
     assert (code, errors) == (0, "")
     assert "0 estimated, 5 unchanged, 1 failed" in said
-    rows, reasons = whole(place / "out")
+    rows, reasons = whole(estimated)
     assert len(rows) == 5
     assert list(reasons) == ["drive1.csv"]
     assert "drive1.csv" in reasons["drive1.csv"]
     broken.write_bytes(content)
     assert ran()[0] == 0
-    rows, reasons = whole(place / "out")
+    rows, reasons = whole(estimated)
     assert (len(rows), reasons) == (6, {})
 
 
@@ -279,11 +297,17 @@ def test_what_is_no_address_of_a_scheduler_is_one_line(
 def test_a_full_disk_is_no_success(place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each log's reason stands among the failures; a caller that looks at the exit code alone must see it too."""
     failed = {"drive0.csv": "kann nicht", "drive1.csv": "is damaged"}
-    done = FleetResult(4, 0, failed, 1, 0, 4000, 0, (1.0,), (0.1,))
+    done = FleetResult(4, 0, failed, 1, 0, 0, 4000, 0, (1.0,), (0.1,))
     monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
     assert "no space was left on the disk for 1 of 6 logs" in errors
+
+
+def test_that_logs_have_notes_is_said(place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
+    done = FleetResult(4, 0, {}, 0, 0, 2, 4000, 0, (1.0,), (0.1,))
+    monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
+    assert "2 logs have notes, in the report" in ran()[1]
 
 
 @pytest.mark.parametrize(
@@ -309,6 +333,36 @@ def test_a_full_disk_is_known_by_its_number_and_not_by_a_text(error: Exception, 
         outcome = _attempt(log, step)
         assert isinstance(outcome, Outcome)
         assert outcome.disk_full is full
+
+
+def test_a_result_that_is_lost_with_the_last_worker_does_not_stop_the_call() -> None:
+    """It was done, and its worker gone before it was fetched: the call starts a worker, which does it again."""
+    log = FleetLog("drive0.csv", "drive0.csv", 1, "Heros", None, None)  # type: ignore[arg-type]
+    workers: dict[str, object] = {}
+
+    class Future:
+        key, status = "a", "finished"
+
+        def result(self, timeout: float | None = None) -> list[Outcome]:
+            assert workers or timeout is not None, "waits for ever"
+            if not workers:
+                raise TimeoutError
+            return [Outcome("drive0.csv")]
+
+    class Client:
+        status = "running"
+
+        def submit(self, *_: object, **__: object) -> Future:
+            return Future()
+
+        def scheduler_info(self, **_: object) -> dict[str, object]:
+            return {"workers": workers}
+
+        def wait_for_workers(self, *_: object, **__: object) -> None: ...
+
+    pool = Pool(Client, "this machine", lambda: workers.update(anew=1))
+    pool.connect(1.0)
+    assert [one.log for one in pool.run([log], None, None)] == ["drive0.csv"]  # type: ignore[arg-type]
 
 
 def test_maps_of_logs_with_positions(place: Path, ran: Ran) -> None:
@@ -408,35 +462,33 @@ def test_a_second_call_on_one_folder_is_refused_while_the_first_works(place: Pat
 
 
 @pytest.mark.parametrize("content", ['{"log": "dr', "[1, 2]", '{"log": "drive1.csv"}'])
-def test_a_damaged_note_is_one_line_and_loses_nothing(place: Path, ran: Ran, content: str) -> None:
-    out = place / "out"
-    assert ran()[0] == 0
-    (note,) = [one for one in (out / "state/logs").iterdir() if "drive1.csv" in one.read_text()]
+def test_a_damaged_note_is_one_line_and_loses_nothing(estimated: Path, ran: Ran, content: str) -> None:
+    (note,) = [one for one in (estimated / "state/logs").iterdir() if "drive1.csv" in one.read_text()]
     note.write_text(content)
-    before = written(out)
+    before = written(estimated)
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
     assert f"{note}: is damaged; remove it" in errors
-    assert written(out) == before
+    assert written(estimated) == before
     note.unlink()
     assert "1 estimated, 5 unchanged, 0 failed" in ran()[1]
-    assert len(whole(out)[0]) == 6
+    assert len(whole(estimated)[0]) == 6
 
 
-def test_logs_of_earlier_calls_do_not_leave_the_tables_in_silence(place: Path, ran: Ran) -> None:
+def test_logs_of_earlier_calls_do_not_leave_the_tables_in_silence(
+    place: Path, estimated: Path, ran: Ran
+) -> None:
     """Their notes are gone, and this call does not name them."""
-    out = place / "out"
-    assert ran()[0] == 0
-    before = {path: path.read_bytes() for path in out.glob("[!.]*.*")}
-    for note in (out / "state/logs").iterdir():
+    before = {path: path.read_bytes() for path in estimated.glob("[!.]*.*")}
+    for note in (estimated / "state/logs").iterdir():
         note.unlink()
     some = (place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")
     code, _, errors = ran(*some)
     assert (code, errors.count("\n")) == (2, 1)
     assert "state/logs: lacks the notes of drive0.csv and 2 others" in errors
-    assert {path: path.read_bytes() for path in out.glob("[!.]*.*")} == before
+    assert {path: path.read_bytes() for path in estimated.glob("[!.]*.*")} == before
     assert "6 estimated, 0 unchanged, 0 failed" in ran()[1]
-    assert len(whole(out)[0]) == 6
+    assert len(whole(estimated)[0]) == 6
 
 
 @pytest.mark.parametrize("name", ["soils.json", "report.html", "soils.parquet"])
@@ -468,31 +520,27 @@ def test_a_link_to_nothing_fails_alone(place: Path, ran: Ran) -> None:
     assert "gone.csv: no such file" in said
 
 
-def test_estimates_that_are_gone_or_cut_short_are_made_anew(place: Path, ran: Ran) -> None:
-    out = place / "out"
-    assert ran()[0] == 0
-    files = sorted((out / "estimates").rglob("*.parquet"))
+def test_estimates_that_are_gone_or_cut_short_are_made_anew(estimated: Path, ran: Ran) -> None:
+    files = sorted((estimated / "estimates").rglob("*.parquet"))
     files[0].unlink()
     files[1].write_bytes(files[1].read_bytes()[:200])
     assert "2 estimated, 4 unchanged, 0 failed" in ran()[1]
-    assert len(whole(out)[0]) == 6
+    assert len(whole(estimated)[0]) == 6
 
 
-def test_a_log_with_estimates_is_no_failure(place: Path, ran: Ran) -> None:
+def test_a_log_with_estimates_is_no_failure(place: Path, estimated: Path, ran: Ran) -> None:
     """A worker may have stored a log's note just before it was lost."""
-    assert ran()[0] == 0
     table = pa.table({"log": ["drive0.csv"], "reason": ["its worker was lost"]})
-    pq.write_table(table, place / "out/failures.parquet")
-    summary = pd.read_parquet(place / "out/summary.parquet")
-    summary[summary["log"] != "drive0.csv"].to_parquet(place / "out/summary.parquet")
+    pq.write_table(table, estimated / "failures.parquet")
+    summary = pd.read_parquet(estimated / "summary.parquet")
+    summary[summary["log"] != "drive0.csv"].to_parquet(estimated / "summary.parquet")
     assert ran(place / "logs/b/*.csv", "--vehicle", place / "Heros.yaml")[0] == 0
-    rows, reasons = whole(place / "out")
+    rows, reasons = whole(estimated)
     assert (len(rows), reasons) == (6, {})
 
 
-def test_a_log_whose_worker_was_lost_keeps_its_earlier_estimates(place: Path, ran: Ran) -> None:
-    assert ran()[0] == 0
-    store = Store.at(str(place / "out"))
+def test_a_log_whose_worker_was_lost_keeps_its_earlier_estimates(estimated: Path, ran: Ran) -> None:
+    store = Store.at(str(estimated))
     before, failed = known_notes(store)
     lost = Outcome("drive0.csv", reason="no worker came back", worker_lost=True)
     broken = Outcome("drive1.csv", reason="is no log")
@@ -501,19 +549,18 @@ def test_a_log_whose_worker_was_lost_keeps_its_earlier_estimates(place: Path, ra
     assert reasons["drive0.csv"] == "no worker came back; its estimates of an earlier call are kept"
     assert reasons["drive1.csv"] == "is no log"
     write_tables(store, notes, reasons)
-    left = {path.name for path in (place / "out/estimates").rglob("*.parquet")}
+    left = {path.name for path in (estimated / "estimates").rglob("*.parquet")}
     assert "drive0.csv.parquet" in left
     assert "drive1.csv.parquet" not in left
     assert set(known_notes(store)[1]) == {"drive0.csv", "drive1.csv"}, "both run last in the next call"
     assert "1 estimated, 5 unchanged, 0 failed" in ran()[1]
-    assert whole(place / "out")[1] == {}
+    assert whole(estimated)[1] == {}
 
 
 def test_what_every_log_would_fail_by_is_refused_and_loses_nothing(
-    place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch
+    place: Path, estimated: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert ran()[0] == 0
-    before = written(place / "out")
+    before = written(estimated)
     (place / "bad.dbc").write_text("no DBC")
     mistakes = (
         ("--dbc", place / "no.dbc"),
@@ -529,12 +576,11 @@ def test_what_every_log_would_fail_by_is_refused_and_loses_nothing(
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
     assert "and 0.0.1 here; install the same version" in errors
-    assert written(place / "out") == before
+    assert written(estimated) == before
 
 
-def test_a_store_that_cannot_be_read_is_one_line(place: Path, ran: Ran) -> None:
-    assert ran()[0] == 0
-    table = place / "out/failures.parquet"
+def test_a_store_that_cannot_be_read_is_one_line(estimated: Path, ran: Ran) -> None:
+    table = estimated / "failures.parquet"
     table.unlink()
     table.mkdir()
     code, _, errors = ran()

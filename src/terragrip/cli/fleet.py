@@ -198,4 +198,7 @@ def _lines(done: FleetResult, output: str) -> list[str]:
     if done.kept:
         kept = "1 log of earlier calls is" if done.kept == 1 else f"{done.kept} logs of earlier calls are"
         lines.append(f"{kept} kept.")
+    if done.noted:
+        which = "1 log has notes" if done.noted == 1 else f"{done.noted} logs have notes"
+        lines.append(f"{which}, in the report and in summary.parquet: what seems wrong, or was assumed.")
     return [*lines, f"Written to {output}; read {output}/report.html"]

@@ -28,6 +28,8 @@ CONNECT_TIMEOUT = 10.0
 _MEMORY = "most likely it needs more memory than a worker has; raise --memory or use fewer --workers"
 _POLL = 0.05
 """Time between two looks at the results [s]."""
+_FETCH = 5.0
+"""How long to wait for a result before looking after the workers again [s]; one that is lost with its worker is computed anew."""
 _COUNT = 1.0
 """Time between two counts of the workers [s]; each count is a request to the scheduler."""
 
@@ -274,6 +276,8 @@ class Pool:
                     continue
                 try:
                     outcomes = _outcomes_of(future, batch, suspects)
+                except TimeoutError:  # lost with its worker, perhaps the last, which this loop restarts
+                    continue
                 except (CancelledError, OSError):  # the scheduler is lost, and its results with it
                     lost = True
                     break
@@ -348,11 +352,12 @@ def _lost_with(client: Any, open_batches: Mapping[Any, list[FleetLog]]) -> list[
 
 
 def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -> list[Outcome]:
-    """The outcomes of a batch that is no longer pending. Raises CancelledError or OSError if its scheduler was lost."""
+    """The outcomes of a batch that is no longer pending. Raises CancelledError or OSError if its scheduler was lost, TimeoutError if
+    its result does not come within `_FETCH`."""
     from distributed import KilledWorker
 
     if future.status != "error":
-        result: list[Outcome] = future.result()
+        result: list[Outcome] = future.result(timeout=_FETCH)
         return result
     error = future.exception()
     if isinstance(error, KilledWorker):

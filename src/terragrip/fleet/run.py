@@ -26,7 +26,8 @@ logger = logging.getLogger("terragrip.fleet")
 @dataclass(frozen=True)
 class FleetResult:
     """What a call did. ``estimated``: logs estimated now; ``unchanged``: logs whose estimates from an earlier call still hold; ``failed``:
-    reasons by log, ``unwritten`` of them for lack of disk space; ``kept``: logs of earlier calls that this one did not name. Of the logs
+    reasons by log, ``unwritten`` of them for lack of disk space; ``kept``: logs of earlier calls that this one did not name; ``noted``:
+    logs named now whose estimates have notes. Of the logs
     estimated now: ``rows``, ``restarts`` of the filter, and of each log ``nis`` over its expected value and the ``seconds`` of a worker."""
 
     estimated: int
@@ -34,6 +35,7 @@ class FleetResult:
     failed: dict[str, str]
     unwritten: int
     kept: int
+    noted: int
     rows: int
     restarts: int
     nis: tuple[float, ...]
@@ -114,6 +116,7 @@ def run_fleet(
         failed={one.log: one.reason or "" for one in outcomes if one.note is None},
         unwritten=sum(one.disk_full for one in outcomes),
         kept=sum(note["log"] not in named for note in notes),
+        noted=sum(one.note is not None and bool(one.note["summary"]["notes"]) for one in outcomes),
         rows=sum(one["rows"] for one in fresh),
         restarts=sum(one["restart_events"] for one in fresh),
         nis=tuple(one["nis"] for one in fresh if one["nis"] is not None),
