@@ -190,6 +190,29 @@ def test_a_recording_as_a_table(run: Any) -> None:
     assert {"ground_speed", "m/s", "wheel_speed_fl", "rad/s"} <= set(cells)
 
 
+def test_what_a_terminal_shows_is_one_line_and_a_mistyped_column_is_suggested(
+    run: Any, estimates: tg.Estimates
+) -> None:
+    curve = tg.AdhesionCurve(bootstrap=0).fit(estimates["slip_rr"], estimates["adhesion_rr"])
+    assert f"{len(estimates)} rows" in repr(estimates)
+    assert "ground_speed" in repr(run.recording)
+    assert f"a={curve.parameters_['a']:.4g}" in repr(curve)
+    assert max(len(repr(one)) for one in (estimates, run.recording, curve)) < 600
+    for table in (estimates, run.recording):
+        with pytest.raises(KeyError, match="did you mean ground_speed"):
+            table["ground_sped"]
+
+
+def test_slips_in_per_cent_are_refused(estimates: tg.Estimates) -> None:
+    curve = tg.AdhesionCurve(bootstrap=0).fit(estimates["slip_rr"], estimates["adhesion_rr"])
+    for call in (
+        lambda: curve.predict(20),
+        lambda: curve.fit(100 * estimates["slip_rr"], estimates["adhesion_rr"]),
+    ):
+        with pytest.raises(InputError, match="divide per cents by 100"):
+            call()
+
+
 @pytest.mark.parametrize("name", [n for n in tg.__all__ if n not in ("__version__", "InputError")])
 def test_public_signatures_are_typed(name: str) -> None:
     """Every public function and method says what it takes and what it gives."""

@@ -134,3 +134,12 @@ def test_everyday_units_leave_pint_asleep() -> None:
         "quantity('139 kg', 'kg'); quantity('2 N s/rad', 'N s/rad'); sys.exit('pint' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "fix"), [("0,83 m", "'0.83 m'"), ("-1,5", "'-1.5'"), ("1,234 kg", "'1.5 kg'")]
+)
+def test_a_decimal_comma_is_refused_with_the_number_by_a_point(text: str, fix: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        quantity(text, "kg" if "kg" in text else "m")
+    assert fix in (caught.value.hint or "")  # three digits behind the comma may be thousands

@@ -271,3 +271,11 @@ def test_who_does_not_know_where_torques_are_measured_presses_enter(
     assert main(["new", "vehicle", "-o", str(asked), "--quiet"]) == 0
     assert main(["new", "vehicle", "--class", "six-wheel", "-o", str(unsaid), "--quiet"]) == 0
     assert asked.read_text() == unsaid.read_text()
+
+
+@pytest.mark.parametrize(
+    ("size", "fix"), [("520/70R38", "some 0.822 m"), ("18.4R38", "measure it"), ("11,2-28", "measure it")]
+)
+def test_a_tyres_size_for_a_radius_is_refused_with_what_to_give(size: str, fix: str) -> None:
+    with pytest.raises(InputError, match=fix):
+        make("tractor-4wd", "torque", {"wheel_radius": size})

@@ -14,6 +14,10 @@ _SIZE = re.compile(
 )
 
 
+_INCHES = re.compile(r"\s*\d{1,2}(?:[.,]\d{1,2})?(?:/\d{2,3})?\s*[R-]\s*\d{2}(?:[.,]\d)?\s*", re.IGNORECASE)
+"""18.4R38, 11.2-28: sizes in inches, whose height is not in them."""
+
+
 @dataclass(frozen=True)
 class TireSize:
     """``radius`` unloaded and ``width`` of the section [m]."""
@@ -35,3 +39,8 @@ def tire_size(text: str) -> TireSize | None:
     width, ratio, rim = (float(found[key]) for key in ("width", "ratio", "rim"))
     width *= 1e-3
     return TireSize(0.5 * rim * INCH + width * ratio / 100, width)
+
+
+def is_tire_size(text: str) -> bool:
+    """Whether ``text`` is a tyre's size, metric or in inches."""
+    return tire_size(text) is not None or _INCHES.fullmatch(text) is not None

@@ -61,6 +61,8 @@ _POWER = re.compile(r"(?<=[a-z°])(-[1-4]|[234])(?![\d.])")
 """``m/s2``, ``m s-1``: an exponent without its sign of a power."""
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.DOTALL)
+_COMMA = re.compile(r"\s*[+-]?\d+,(?:\d{1,2}|\d{4,})(?:\s*[^\d\s,.][^,]*)?\s*")
+"""A decimal comma; three digits behind it may be thousands."""
 _HARMLESS = re.compile(r"[A-Za-z0-9_%°µ^*/(). +-]{1,60}$")
 _KINDS: dict[Dimension, str] = {
     (1, 0, 0, 0): "a mass", (0, 1, 0, 0): "a length", (0, 0, 1, 0): "a time", (0, 1, -1, 0): "a speed",
@@ -147,7 +149,9 @@ def quantity(value: object, si_unit: str) -> float:
     if isinstance(value, str):
         match = _NUMBER.match(value)
         if match is None or match[2].startswith(","):
-            raise UnitError(f"{_short(value)} is not a number with a unit", example)
+            comma = _COMMA.fullmatch(value)
+            fix = f"write it with a point, '{value.strip().replace(',', '.')}'" if comma else example
+            raise UnitError(f"{_short(value)} is not a number with a unit", fix)
         number = float(match[1]) * (factor_to(match[2], si_unit) if match[2] else 1.0)
     else:
         try:

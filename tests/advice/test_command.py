@@ -32,6 +32,13 @@ def test_it_says_and_writes_the_same_best_slip(folder, capsys):
     assert best["interval"][0] < best["slip"] < best["interval"][1]
 
 
+def test_a_library_among_the_estimates_is_refused_with_its_option(folder, capsys):
+    (folder / "soils.json").write_text('{"soils": {}}')
+    code, _, error = called(capsys, "drive.parquet", "soils.json", "--vehicle", "v.yaml")
+    assert (code, len(error.strip().splitlines())) == (2, 1)
+    assert "--soils" in error
+
+
 def test_another_vehicles_file_is_refused_in_one_line(folder, capsys):
     text = (folder / "v.yaml").read_text().replace("fl", "left").replace("fr]", "right]")
     (folder / "other.yaml").write_text(text)

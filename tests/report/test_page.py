@@ -116,10 +116,12 @@ def test_an_absent_input_leaves_a_sentence_not_an_error(drive: Drive, missing: s
     )
     html = render(Page("t", "l", made))
     assert "simulated data" not in html
+    assert ("The strip on top" in html) == (missing != "labels")
     if missing == "labels":
         assert "no section of these runs carries a soil label" in html
     if missing == "truth":
         assert "simulated" not in html
+        assert "cover the truth" not in html  # what is shown is the noise alone
 
 
 def test_with_nothing_to_compare_the_sections_say_so(drive: Drive) -> None:

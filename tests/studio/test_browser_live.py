@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -49,6 +50,13 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
         page.wait_for_selector("#live-state:has-text('connection lost')")
         page.wait_for_selector("#live-age:has-text('s old')")
         assert page.evaluate(mark) == "line-through"
+
+
+def test_without_a_service_nothing_is_called_lost(page: Any, served: Served, folder: Path) -> None:
+    (folder / "estimates.parquet").unlink()
+    page.goto(f"{served.url}/#/live")
+    page.wait_for_selector("#live-state:has-text('no live service was named')")
+    assert "lost" not in page.inner_text("#live-state")
 
 
 def test_the_numbers_are_whole_on_a_telephone(page: Any, served: Served) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from served import NEEDS, Served, axe_violations
 
@@ -256,9 +257,28 @@ def test_an_impossible_number_is_said_and_nothing_is_saved(
     page.fill("#machine-mass", "50 kg")
     page.wait_for_selector(".sketch")
     page.fill("#machine-wheel_radius", "-3 cm")
-    page.wait_for_selector("#machine-problem:has-text('impossible')")
+    page.wait_for_selector(
+        "#machine-wheel_radius[aria-invalid=true] + #machine-problem:has-text('impossible')"
+    )
+    assert page.query_selector(".maker-picture.of-before")  # what is drawn is of the numbers before
     assert page.is_disabled("#save-machine")
     assert list(folder.glob("*.yaml")) == []
+    page.fill("#machine-wheel_radius", "3 cm")
+    page.wait_for_selector(".maker-picture:not(.of-before)")
+
+
+def test_a_matlab_logs_own_times_are_not_asked_for(
+    page: Any, served: Served, folder: Path, tmp_path: Path
+) -> None:
+    time = np.arange(0.0, 30.0, 0.1)
+    speed = 1 + 0.2 * np.sin(time)
+    savemat(tmp_path / "run.mat", {"data": {"time": time, "omega_fl": 5 * speed, "v_gps": speed}})
+    page.goto(served.url)
+    choose_columns(Hand(page), tmp_path / "run.mat")
+    assert page.inner_text("#time-column option:checked") == "the log's own times"
+    page.click("#use-columns")
+    page.wait_for_selector("#wizard-profile option[value='run-profile.yaml']", state="attached")
+    assert "time: {from: time}" in (folder / "run-profile.yaml").read_text()
 
 
 def test_the_pages_fit_every_width_and_axe_finds_nothing_serious(

@@ -33,6 +33,7 @@ def test_a_good_log_is_taken_and_told(client: TestClient, folder: Path) -> None:
         ("broken.parquet", b"PAR1 and then nothing of the sort", ""),
         ("empty.csv", b"", "is empty"),
         ("virus.exe", b"MZ", "not a file that the studio accepts"),
+        ("day.xlsx", b"PK\x03\x04", "save the sheet as CSV"),
         ("page.html", b"<script>alert(1)</script>", "not a file that the studio accepts"),
         ("picture.png", b"<svg onload='alert(1)'>", "is no PNG picture"),
         ("picture.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "not a picture that the studio accepts"),

@@ -81,6 +81,7 @@ def test_the_columns_of_a_formula_are_named() -> None:
         ("abs(*a)", "is not arithmetic"),
         ("max(a, key=b)", "equals sign"),
         ("a[0]", "Subscript is not arithmetic"),
+        ("a * 9,81", "write a number as 9.81"),
         ("[a for a in b]", "is not arithmetic"),
         ("a if b else 1", "is not arithmetic"),
         ("a and b", "is not arithmetic"),

@@ -120,4 +120,6 @@ def test_a_service_that_is_not_there_is_said(folder: Path) -> None:
         TestClient(create_app(folder, live="ws://127.0.0.1:9"), base_url="http://127.0.0.1:8750") as client,
         client.websocket_connect(STREAM) as socket,
     ):
-        assert "does not answer" in socket.receive_json()["text"]
+        said = socket.receive_json()["text"]
+    assert "does not answer" in said
+    assert "studio://127.0.0.1:9" in said  # the address that was named, not another

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.errors import InputError
+from terragrip.errors import InputError, suggestion
 from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.engine import EVENTS
@@ -88,7 +88,14 @@ class Estimates:
             return self.time
         if name == "event":
             return np.array(EVENTS, dtype=object)[self.event_codes]
+        if name not in self.labels and name not in self.columns:
+            raise KeyError(suggestion(name, self.names) or name)
         return self.labels[name] if name in self.labels else self.columns[name]
+
+    def __repr__(self) -> str:
+        of = (self.about.get("vehicle") or {}).get("name", "a vehicle")
+        span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self) else "no row"
+        return f"<Estimates of {of} by {self.about.get('method', 'a method')}: {len(self)} rows, {span}, {len(self.names)} columns>"
 
     def select(self, rows: Any) -> Self:
         """The rows of a mask, a slice or an array of increasing indices; a slice copies no data."""
@@ -279,9 +286,10 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
     try:
         return reading(os.fspath(path))
     except pa.ArrowInvalid as error:
-        raise InputError(
-            "is not a Parquet file, or is damaged", file=path, hint="write it again with 'terragrip estimate'"
-        ) from error
+        hint = "write it again with 'terragrip estimate'"
+        if os.fspath(path).lower().endswith(".json"):
+            hint = "a library of soils is given with --soils, a ground.json with --ground, beside files of estimates"
+        raise InputError("is not a Parquet file, or is damaged", file=path, hint=hint) from error
     except OSError as error:
         raise unreadable(path, error) from error
 

@@ -43,8 +43,12 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
     whole = Picture(
         f"traction-{run.name}",
         timeline(run, lanes),
-        f"{sim} {run.name}, method {run.method}: {what} of wheel {wheel} over time: {sources}. The strip on top "
-        "names the soil, grey is a transition (vehicle and tool on different soils)."
+        f"{sim} {run.name}, method {run.method}: {what} of wheel {wheel} over time: {sources}."
+        + (
+            " The strip on top names the soil, grey is a transition (vehicle and tool on different soils)."
+            if run.soils
+            else ""
+        )
         + (" Shaded: the vehicle is stuck." if run.stuck.any() else ""),
         f"Traction of wheel {wheel} over time in {run.name}: {sources}",
     )
@@ -167,9 +171,9 @@ def soils(run: Run, together: Sequence[Run]) -> Section:
 
 def honesty(shown: Run, covered: Sequence[Coverage]) -> Section:
     """Coverage of the intervals (of runs with a truth) and NIS of one run against chi-square."""
-    title = "Do the intervals cover the truth?"
     content: list[Picture | Table] = []
     judged = len({item.run for item in covered if item.rows})
+    title = "Do the intervals cover the truth?" if judged else "Is the noise set right?"
     if judged:
         content += [
             Picture(

@@ -50,7 +50,7 @@ def section(
     by_part = bool(result) and {one.label for one in result} <= set(PARTS)
     prose = [_driven(driven, simulated), *_slips(result, by_part), *_allowed(curves, result, tire_resistance)]
     if warnings is not None:
-        said = names([f"{count} of {kind}" for kind, count in sorted(warnings.items())])
+        said = names([f"{kind} {count} time{'s' * (count > 1)}" for kind, count in sorted(warnings.items())])
         prose.append(
             f"Warnings: {said}."
             if said

@@ -24,8 +24,20 @@ if TYPE_CHECKING:
 FREE = "free"
 AT_BOUND = 1e-3
 """Share of a parameter's range that counts as its end."""
+_LARGEST = 1.5
+"""Slip above which most rows of a drive never are, as a ratio; in per cent nearly all are."""
 BAND = np.round(np.linspace(0.0, 1.0, 101), 3)
 """Slips that a band is written at."""
+
+
+def _refuse_percent(slip: ArrayLike) -> None:
+    """Raise InputError where slips are no ratios: of most rows of a drive none is above 1."""
+    known = np.abs(np.asarray(slip, dtype=float))
+    known = known[np.isfinite(known)]
+    if known.size and (usual := float(np.median(known))) > _LARGEST:
+        raise InputError(
+            f"a slip of {usual:.3g} is {usual:.0%}", hint="slip is a ratio: divide per cents by 100"
+        )
 
 
 class AdhesionCurve:
@@ -77,6 +89,7 @@ class AdhesionCurve:
         Pairs are sorted by slip. Bins by pull need the pull: `pull_bins.bin_by_pull` and `fit_bins`.
         Raises InputError where the data have fewer used bins than free parameters, or only one, and on bounds that the model does not have.
         """
+        _refuse_percent(slip)
         labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
         return self.fit_bins(bin_pairs(slip, adhesion, labels, replace(self.bins, by=BY_SLIP)))
 
@@ -121,7 +134,8 @@ class AdhesionCurve:
         return self
 
     def predict(self, slip: ArrayLike) -> Floats:
-        """mu (or kappa, with an intercept) at the slips, same shape."""
+        """mu (or kappa, with an intercept) at the slips, same shape. Raises InputError where they are per cents."""
+        _refuse_percent(slip)
         return CURVES[self.model].value(slip, self._of_model(), self.parameters_.get(INTERCEPT, 0.0))
 
     @property
@@ -162,6 +176,10 @@ class AdhesionCurve:
     def plot(self) -> Figure:
         """The fitted curve with its bins, as a matplotlib figure; raises InputError before `fit`, or without matplotlib."""
         return self._library().plot()
+
+    def __repr__(self) -> str:
+        fitted = [f"{name}={value:.4g}" for name, value in getattr(self, "parameters_", {}).items()]
+        return f"<AdhesionCurve {self.model}: {', '.join(fitted) or 'not fitted'}>"
 
     def _repr_html_(self) -> str:
         return self._library()._repr_html_() if hasattr(self, "bins_") else f"<p>{self.model}, not fitted</p>"

@@ -104,6 +104,12 @@ def _allow(node: ast.AST) -> None:
         node, (ast.BinOp, ast.UnaryOp, ast.Compare, ast.Name, ast.Load, *BINARY, *UNARY, *COMPARISONS)
     ):
         kind = type(node).__name__
+        if kind == "Tuple":
+            raise InputError(
+                "a comma separates the arguments of a function",
+                place="formula",
+                hint="write a number as 9.81",
+            )
         dotted = "a dot is not part of a name" if kind == "Attribute" else f"{kind} is not arithmetic"
         raise InputError(dotted, place="formula", hint=ALLOWED)
 

@@ -136,7 +136,7 @@ async def relayed(address: str, token: str | None, vehicle: str = "") -> AsyncIt
         raise InputError(
             f"does not answer ({error})",
             place=address,
-            hint="start 'terragrip live' with --sink studio://127.0.0.1:8766",
+            hint=f"start 'terragrip live' with --sink studio://{address.partition('://')[2].rstrip('/')}",
         ) from error
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from terragrip.errors import InputError, suggestion
+from terragrip.tire_size import is_tire_size, tire_size
 from terragrip.units import UnitError, quantity
 from terragrip.vehicle_maker.classes import MachineClass, Typical
 
@@ -157,6 +158,12 @@ def read_values(machine: MachineClass, signals: Signals, given: Mapping[str, obj
         try:
             values[name] = quantity(value, asked[name].unit)
         except UnitError as error:
+            if name in ("wheel_radius", "front_wheel_radius") and is_tire_size(str(value)):
+                size = tire_size(str(value))
+                radius = "measure it" if size is None else f"that tyre's is some {size.rolling_radius:.3g} m"
+                raise InputError(
+                    f"{value!r} is a tyre's size", place=name, hint=f"give the rolling radius: {radius}"
+                ) from error
             raise InputError(error.problem, place=name, hint=error.hint) from error
         if (values[name] < 0 and name != "payload_x") or (
             values[name] == 0 and not (asked[name].is_spread or name == "payload_x")

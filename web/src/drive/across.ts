@@ -131,6 +131,7 @@ export class Across {
     if (!x || !y) {
       this.plane.show([], null);
       this.element.dataset["pairs"] = "0";
+      this.caption.textContent = "";
       return;
     }
     const [start, end] = this.shown;

@@ -76,7 +76,8 @@ export const page: Page = (main, { query }) => {
     main.classList.toggle("dead", dead && !predicted);
     main.classList.toggle("predicted", predicted);
     const said = !feed.ring.taken ? "NO DATA YET" : predicted ? `PREDICTED ONLY, no measurement for ${seconds(unmeasured)}` : `NO DATA for ${seconds(unmeasured)}`;
-    age.textContent = dead || predicted ? `${said}${feed.state === "lost" ? ` (${why})` : feed.state === "ended" ? " (the run has ended)" : ""}` : `measured ${seconds(unmeasured)} ago`;
+    if (dead || predicted) fill(age, said, feed.state === "lost" ? h("small", {}, why) : feed.state === "ended" ? " (the run has ended)" : null);
+    else age.textContent = `measured ${seconds(unmeasured)} ago`;
     alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }
   const watch = window.setInterval(look, CHECK);

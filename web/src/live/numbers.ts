@@ -83,5 +83,6 @@ export function oldSaid(predicted: boolean, age: number, ended: boolean): string
 
 /** What a driver can read at a glance: the event, without the figures and the rule after it, which are in the list of events. */
 export function brief(text: string): string {
-  return text.split(": ")[0] ?? text;
+  const [head = "", ...rest] = text.split(": ");
+  return rest.length && /^[a-z]/.test(head) ? rest.join(": ") : head; // the service's begin with the warning, which is said beside them
 }

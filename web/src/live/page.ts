@@ -128,7 +128,7 @@ export const page: Page = (main, { notices, query }) => {
     const connected = feed.state === "connected";
     const isCurrent = connected && !isOld && !waiting;
     state.className = `state ${isCurrent ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
-    state.textContent = { connecting: "connecting …", connected: isCurrent ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: `connection lost: ${why}`, ended: "the run has ended" }[feed.state];
+    state.textContent = { connecting: "connecting …", connected: isCurrent ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: feed.hello ? `connection lost: ${why}` : why, ended: "the run has ended" }[feed.state];
     main.classList.toggle("stale", isOld);
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;

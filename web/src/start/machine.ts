@@ -118,8 +118,16 @@ export class MachineMaker {
 
   /** What forbids saving, or "". While the server is still asked, the button stays as it is: else it would swallow a click. */
   private refuse(problem: string): void {
-    this.problem.textContent = problem;
     this.save.disabled = problem !== "";
+    const place = (problem.split(":", 1)[0] as string).replaceAll(".", "_"); // wheel_radius, or wheel.radius of the file
+    for (const [name, input] of this.inputs) {
+      const isWrong = problem !== "" && name === place;
+      input.setAttribute("aria-invalid", String(isWrong));
+      if (isWrong) input.after(this.problem);
+    }
+    if (!this.problem.isConnected || !this.problem.parentElement?.querySelector("[aria-invalid=true]")) this.form.after(this.problem);
+    this.problem.textContent = problem;
+    for (const one of [this.picture, this.costs]) one.classList.toggle("of-before", problem !== "");
   }
 
   private drawFields(fields: Field[]): void {

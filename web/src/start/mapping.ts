@@ -142,7 +142,8 @@ export class Mapping {
 
   private timeRow(look: Look): HTMLElement {
     const time = look.time ?? { from: "" };
-    const select = h("select", { id: "time-column" }, h("option", { value: "" }, "– choose –"), look.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
+    const isOwn = Boolean(time.from) && !look.columns.some((column) => column.name === time.from); // each signal was stamped: MATLAB, CAN, ROS
+    const select = h("select", { id: "time-column" }, isOwn ? h("option", { value: String(time.from), selected: true }, "the log's own times") : h("option", { value: "" }, "– choose –"), look.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
     const unit = h("input", { type: "text", id: "time-unit", class: "unit", value: String(time.unit ?? "s"), "aria-label": "Unit of the time" });
     const update = (): void => {
       look.time = { ...(look.time ?? {}), from: select.value };
@@ -151,7 +152,7 @@ export class Mapping {
     };
     select.addEventListener("change", update);
     unit.addEventListener("change", update);
-    return h("div", { class: "map-row" }, h("label", { for: select.id, class: "channel" }, "time"), select, unit, h("span"), h("span"), h("p", { class: "why hint" }, look.time ? "runs forward" : "No column looks like time: choose it."));
+    return h("div", { class: "map-row" }, h("label", { for: select.id, class: "channel" }, "time"), select, unit, h("span"), h("span"), h("p", { class: "why hint" }, isOwn ? "each signal has its times in the log" : look.time ? "runs forward" : "No column looks like time: choose it."));
   }
 
   private row(channel: Channel): HTMLElement {

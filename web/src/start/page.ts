@@ -84,7 +84,7 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
     const taken = await tried(() => upload(file.name, file, exists, (share) => (bar.value = share)));
     line.remove();
     if (!taken) return;
-    note(`${taken.path} taken`);
+    note(`${taken.path} is in the folder`);
     if (taken.kind === "recording" && alone) location.hash = pageOf(taken.path);
     else await reload();
   }

@@ -75,7 +75,7 @@ export function unitNamed(name: Kind | string): Unit {
 
 /** A number as it is shown while it changes, without its unit; "–" where it is not known. */
 export function fixed(value: number, { scale, decimals }: Unit): string {
-  return Number.isFinite(value) ? (value * scale).toFixed(decimals) : "–";
+  return Number.isFinite(value) ? (value * scale).toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "–";
 }
 
 /** A number with its unit in a sentence; a ratio has none. */

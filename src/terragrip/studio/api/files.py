@@ -197,6 +197,8 @@ def _check(temporary: Path, path: str) -> None:
         elif kind == "picture":
             check_picture(temporary.read_bytes()[:64], temporary.suffix.lower(), path)
         elif kind is None or kind == "report":
+            if temporary.suffix.lower() in (".xlsx", ".xlsm", ".xls", ".ods"):
+                raise InputError("is a workbook", hint="save the sheet as CSV and drop that")
             raise InputError(
                 "is not a file that the studio accepts", hint="drop a log, a vehicle, a profile or a picture"
             )

@@ -1,0 +1,13 @@
+import { expect, it } from "vitest";
+import { brief } from "../src/live/numbers";
+import { fixed } from "../src/ui/units";
+
+it("does not repeat a warning that stands beside its text", () => {
+  expect(brief("stuck: ground speed 0.01 m/s, slip up to 98 % (fr)")).toBe("ground speed 0.01 m/s, slip up to 98 % (fr)");
+  expect(brief("The wheels begin to dig: mean slip of the wheels is 73%")).toBe("The wheels begin to dig");
+});
+
+it("shows no minus before a zero", () => {
+  const unit = { name: "m/s", scale: 1, decimals: 2 } as Parameters<typeof fixed>[1];
+  expect([-0.001, 0.001, -0.01, -10].map((value) => fixed(value, unit))).toEqual(["0.00", "0.00", "-0.01", "-10.00"]);
+});
