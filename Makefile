@@ -35,11 +35,11 @@ help: ## show this list
 demo: $(VENV)/package studio ## set up, simulate the campaign, estimate every run, and say where the report is
 	@$(BIN)/terragrip demo
 
-test: system ## set up, then lint, type checks, import rules, C tests and Python tests
+test: ## set up, then lint, type checks, import rules, C tests and Python tests
 	@$(MAKE) $(AT_ONCE) pytest lint kernel-test web-test
 
-# Side by side, so that no processor waits for pip, npm or a test's timer; three jobs, the longest way first. Each command's output in one piece.
-AT_ONCE := --no-print-directory BESIDE=1 -j 3 $(if $(findstring output-sync,$(.FEATURES)),--output-sync=line)
+# Side by side, so that no processor waits for apt, pip, npm or a test's timer; four jobs, the longest way first. Each command's output in one piece.
+AT_ONCE := --no-print-directory BESIDE=1 -j 4 $(if $(findstring output-sync,$(.FEATURES)),--output-sync=line)
 
 # Every test file imported once: else each worker of pytest would rewrite and compile all of them anew.
 collected: $(VENV)/package $(VENV)/dev
@@ -62,11 +62,11 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 	    || echo "make: could not install$$missing; tests that have no other will be skipped" >&2; \
 	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are slower or skipped" >&2; fi
 
-# Two workers a processor, for nearly half of the time they wait for browsers, brokers and timers. A worker takes a whole file, then the next in order,
+# Three workers a processor, for nearly half of the time they wait for browsers, brokers and timers. A worker takes a whole file, then the next in order,
 # so that what a file's tests share is made once. The workers fill the processors: no threads inside a product of matrices.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder -n
-pytest: collected studio ## the Python tests alone
-	$(PYTEST) $(shell expr 2 \* $(WORKERS))
+pytest: collected studio system ## the Python tests alone
+	$(PYTEST) $(shell expr 3 \* $(WORKERS))
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
 	@$(BIN)/python build_pages.py
@@ -148,8 +148,8 @@ $(VENV)/runtime: $(VENV)/made requirements.lock
 	@$(BIN)/python -m compileall -qq -j 2 -x '/tests?/' $(VENV)/lib || true
 	@touch $@
 
-# After the package, for pip works on one environment one call at a time.
-$(VENV)/dev: $(VENV)/runtime requirements-dev.lock | $(VENV)/package
+# Beside the package, which the compiler is at for most of the time: both have what is in runtime already and add what the other does not.
+$(VENV)/dev: $(VENV)/runtime requirements-dev.lock
 	@echo "Installing the packages of requirements-dev.lock"
 	@$(PIP) install -qq --no-compile -r requirements-dev.lock
 	@touch $@
