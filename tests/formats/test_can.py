@@ -297,6 +297,35 @@ def test_an_asc_log_without_an_end_is_said_to_be_cut(tmp_path: Path) -> None:
     assert any("has no 'End TriggerBlock': it was cut" in note for note in read_table(log).notes)
 
 
+def test_a_line_whose_identifier_has_more_than_29_bits_has_no_frame(tmp_path: Path) -> None:
+    """Found by a fuzzer: one of more than 64 bits ended the reading by an OverflowError."""
+    frames = drive(1000, 20.0).frames
+    log = write_log(tmp_path / "log.asc", frames)
+    whole = read_table(log).columns
+    lines = log.read_text().splitlines()
+    for identifier in ("FFFFFFFFFFFFFFFFFFx", "FFFFFFFFFFFFFFFFFF", "3FFFFFFFx"):
+        log.write_text("\n".join([*lines[:60], f"   1.5 1  {identifier}  Rx  d 1 00", *lines[60:]]) + "\n")
+        again = read_table(log)
+        assert any(note.startswith("1 line has no frame: line 61 (") for note in again.notes), identifier
+        assert all(np.array_equal(again.columns[name], whole[name], equal_nan=True) for name in whole)
+
+
+@pytest.mark.parametrize("head", ["time,id,data", "time,pgn,source,data"])
+@pytest.mark.parametrize("bad", ["FFFFFFFFFFFFFFFFFF", "-1", str(1 << 70)])
+def test_a_row_whose_identifier_has_more_than_29_bits_has_no_frame(
+    tmp_path: Path, head: str, bad: str
+) -> None:
+    frames, by_group = drive(1000, 20.0).frames, "pgn" in head
+    rows = [
+        f"{t:.6f},{(i >> 8) & 0x3FFFF},{i & 0xFF},{d.hex()}" if by_group else f"{t:.6f},{i:08X},{d.hex()}"
+        for t, i, d in frames
+    ]
+    rows.insert(60, f"{frames[60][0]},{bad},{'1,' if by_group else ''}00")
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([head, *rows]) + "\n")
+    assert any("1 line has no frame: line 62 (" in note for note in read_table(log).notes)
+
+
 def blanks(data: bytes) -> str:
     return data.hex(" ").upper()
 

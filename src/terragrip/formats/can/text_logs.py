@@ -42,6 +42,7 @@ _HEAD, _BACK, _LONGEST_STEP = (
     1e6,
 )  # frames that tell what stamps count from: steps run back often, and are short
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
+_BITS = 29  # of an identifier at most
 
 _TIMES = {
     "timestamp": 1.0,
@@ -199,7 +200,10 @@ def by_python_can(
         try:
             for message in reader:
                 in_doubt = False
-                yield from frames_of((message,))
+                if message.arbitration_id >> _BITS:
+                    count.add(number, shown)
+                else:
+                    yield from frames_of((message,))
             break
         except errors:
             if number == failed_at:  # it did not get any further
@@ -246,7 +250,7 @@ def asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Iterat
 
 def _asc_identifier(text: str, base: int) -> int | None:
     try:
-        return int(text[:-1], base) | EXTENDED if text[-1] in "xX" else int(text, base)
+        return _checked(int(text[:-1], base)) | EXTENDED if text[-1] in "xX" else _checked(int(text, base))
     except ValueError:
         return None
 
@@ -323,21 +327,25 @@ def _identifier(layout: Layout) -> Callable[[list[str]], int]:
         group, source = layout.group, layout.source
         assert group is not None
         return lambda cells: (
-            EXTENDED | (int(cells[group]) << 8) | (int(cells[source]) & 0xFF if source else 0xFE)
+            EXTENDED | _checked(int(cells[group]) << 8) | (int(cells[source]) & 0xFF if source else 0xFE)
         )
     place, extended = layout.identifier, layout.extended
 
     def read(cells: list[str]) -> int:
         text = cells[place].strip().strip('"').lower().removeprefix("0x").rstrip("hx")
-        number = int(text, 16)
-        if number >= 1 << 29:
-            raise ValueError("no identifier")
+        number = _checked(int(text, 16))
         wide = number > 0x7FF or (
             len(text) == _EIGHT if extended is None else cells[extended].strip() in ("1", "True", "true")
         )
         return number | EXTENDED if wide else number
 
     return read
+
+
+def _checked(identifier: int) -> int:
+    if identifier >> _BITS:  # below 0, too
+        raise ValueError("no identifier")
+    return identifier
 
 
 def _payload(text: str) -> bytes:
