@@ -154,3 +154,17 @@ def test_numbers_of_the_other_byte_order_are_named() -> None:
         assert unpack(struct.pack("<4d", *sample))[0]["t"] == sample[0]
     with pytest.raises(Unreadable, match="byte_order"):
         unpack(struct.pack(">4d", 0.02, 2.61, 2.58, 0.5))
+
+
+def test_bytes_in_a_payload_do_not_stop_its_numbers() -> None:
+    payload = Profile.from_dict(
+        {
+            "payload": {"format": "struct", "layout": "cQ2d", "fields": ["kind", "t", "fl", "v"]},
+            "time": {"from": "t", "unit": "ns"},
+            "channels": {"ground_speed": "v", "wheel_speed_fl": "fl"},
+        }
+    ).payload
+    unpack = unpacker(payload)
+    assert unpack(struct.pack("<cQ2d", b"a", 1, 2.5, 0.5))[0]["v"] == 0.5
+    with pytest.raises(Unreadable, match="byte_order"):
+        unpack(struct.pack(">cQ2d", b"a", 1, 2.61, 0.51))

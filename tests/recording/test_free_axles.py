@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.simulation import families
 from terragrip.vehicle import Vehicle
 
@@ -49,3 +51,49 @@ def test_a_free_wheels_radius_that_is_a_quarter_off_is_named() -> None:
     free["wheel"]["radius"] *= 1.25
     (note,) = unit_warnings(drawn.recording, Vehicle.from_dict(data))
     assert "1.25 times as fast as the ground, though nothing drives them" in note
+
+
+def rolling(radius: float, slip: float, *, turning: float = 0.0) -> list[str]:
+    """What is said of a free front axle whose ``radius`` the file states as 0.3 m, as that of the driven rear wheels, which slip.
+
+    For a share of the time, ``turning``, the vehicle turns, and the steered front wheels go a longer way.
+    """
+    time = np.arange(0.0, 60.0, 0.1)
+    speed, turn = 1 + 0.1 * np.sin(time), 0.3 * (time % 10 < 10 * turning)
+    channels = {"ground_speed": speed}
+    for side, sign in (("l", -1), ("r", 1)):
+        hub = speed * (1 + sign * turn)
+        channels[f"wheel_speed_f{side}"] = hub * np.where(turn > 0, 1.05, 1.0) / radius
+        channels[f"wheel_speed_r{side}"] = hub / (1 - slip) / 0.3
+    axles = {
+        "front": {"mass": 50, "wheels": ["fl", "fr"], "driven": False},
+        "rear": {"mass": 50, "wheels": ["rl", "rr"]},
+    }
+    shape = {"wheelbase": 1.0, "track": 0.6, "center_of_gravity_height": 0.3}
+    vehicle = Vehicle.from_dict(
+        {"mass": 100, "axles": axles, "wheel": {"radius": 0.3, "inertia": 0.1}, **shape}
+    )
+    return free_axle_warnings(Recording(time, channels), vehicle)
+
+
+@pytest.mark.parametrize(
+    ("radius", "slip", "said"),
+    [
+        (0.3, 0.05, ""),
+        (0.285, 0.01, "may be exchanged"),  # as the driven wheels' speeds would show a slip of 5 %
+        (0.285, 0.04, ""),  # a radius within 5 %
+        (0.24, 0.1, "1.25 times as fast"),  # exchanged the front wheels would slip, too
+        (0.375, 0.05, "0.8 times as fast"),  # exchanged it would be the driven ones that lag
+        (np.inf, 0.05, ""),  # a sensor that reads 0 tells no radius
+    ],
+)
+def test_a_free_axle_is_held_against_the_ground_and_the_driven_one(
+    radius: float, slip: float, said: str
+) -> None:
+    notes = " ".join(rolling(radius, slip))
+    assert said in notes
+    assert bool(said) is bool(notes)
+
+
+def test_what_steered_wheels_do_in_turns_counts_for_nothing() -> None:
+    assert rolling(0.3, 0.01, turning=0.6) == []

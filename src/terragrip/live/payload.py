@@ -42,7 +42,9 @@ def unpacker(payload: Payload | None) -> Unpack:
 
 def _of_other_order(fields: Fields) -> float:
     """The largest of numbers that look like those of the other byte order: most are far too large or too small, one too large. Else 0."""
-    sizes = [abs(value) for value in fields.values() if value and math.isfinite(value)]
+    sizes = [
+        abs(value) for value in fields.values() if isinstance(value, float) and value and math.isfinite(value)
+    ]
     strange = [size for size in sizes if not _TINY < size < _HUGE]
     largest = max(strange, default=0.0)
     return largest if largest > _HUGE and 2 * len(strange) > len(sizes) else 0.0
