@@ -167,6 +167,27 @@ def balance(n: int = 200, seed: int = 1, **more: Any) -> torque_scale._Balance:
     return replace(base, **more)
 
 
+def test_a_resistance_for_each_stretch_is_as_a_term_for_each() -> None:
+    """A day has thousands of stretches: terms for all of them would take hours and all memory."""
+    draws = np.random.default_rng(3)
+    values, weight = draws.normal(0.0, 100.0, (200, 3)), draws.uniform(0.2, 1.0, 200)
+    nuisance, stretch = (
+        np.column_stack([np.arange(200) < 90, np.arange(200) >= 90, draws.normal(size=200)]),
+        np.arange(200) // 6,
+    )
+    rows = balance(nuisance=nuisance.astype(float), stretch=stretch)
+    own = balance(nuisance=np.column_stack([nuisance, stretch[:, None] == np.arange(34)]).astype(float))
+    expected = torque_scale._centered(values, own, weight)
+    np.testing.assert_allclose(torque_scale._centered(values, rows, weight), expected, atol=1e-9)
+    alone = balance(nuisance=np.ones((200, 1)), stretch=stretch)  # the mean is none beside the stretches'
+    np.testing.assert_allclose(
+        torque_scale._centered(values, alone, weight).T
+        @ (weight[:, None] * (stretch[:, None] == np.arange(34))),
+        0.0,
+        atol=1e-9,
+    )
+
+
 def test_the_scale_is_that_of_two_instruments() -> None:
     rows, weight = balance(), np.random.default_rng(2).uniform(0.2, 1.0, 200)
     scale, strength, rest = torque_scale._slope(rows, weight)

@@ -35,6 +35,27 @@ def test_soils_that_no_label_tells_apart_do_not_make_it_sure_and_wrong() -> None
     assert "'soil' column" in scale.sentence
 
 
+def test_loads_that_each_last_for_half_a_minute_are_not_told_from_soils_without_a_label(
+    vehicle: Vehicle,
+) -> None:
+    """On one soil, but nothing says so: the reason and its fix are told, and the label suffices."""
+    rng, t = np.random.default_rng(1), np.arange(0.0, 300.0, 0.05)
+    pull = np.repeat(rng.uniform(50.0, 400.0, 10), 600)
+    omega = 1 / (0.98 - pull / (140 * GRAVITY * 4)) / 0.2
+    wheel = (pull / 4 + (0.06 + 0.02) * 35 * GRAVITY + 2 * omega) * 0.2
+    channels = {"ground_speed": np.ones(len(t)), "drawbar_force": pull}
+    for name in ("fl", "fr", "rl", "rr"):
+        channels |= {f"wheel_speed_{name}": omega, f"drive_torque_{name}": wheel}
+    noisy = {
+        name: values + 0.01 * np.mean(values) * rng.standard_normal(len(t))
+        for name, values in channels.items()
+    }
+    with pytest.raises(InputError, match=r"soils of unlike resistance.*constant: field"):
+        identify_torque_scale(Recording(t, noisy), vehicle)
+    one = Recording(t, noisy, labels={"soil": np.full(len(t), "field", dtype=object)})
+    assert identify_torque_scale(one, vehicle).value == pytest.approx(1.0, abs=0.02)
+
+
 def hilly(rng: np.random.Generator, scale: float, *, push_noise: float, pitch_noise: float) -> Recording:
     """A free vehicle over hills: torque in an unknown unit, accelerometer and pitch each with slow errors."""
     t = np.arange(0.0, 400.0, 0.05)

@@ -127,7 +127,7 @@ def calibrate(
     try:
         quantities.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
     except InputError as error:
-        unknown.append(Unknown("drive_torque_scale", error.problem))
+        unknown.append(Unknown("drive_torque_scale", "; ".join(filter(None, (error.problem, error.hint)))))
     unknown += turned_unseen(corrected, vehicle, [q.name for q in quantities])
     doubts += tuple(gains_by_axle(shared, vehicle))
     return Calibration(tuple(quantities), tuple(unknown), _left(quantities, vehicle), doubts)

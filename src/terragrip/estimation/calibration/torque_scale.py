@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terragrip.arrays import Bools, Floats
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import NORMAL_95, Evidence, Quantity
@@ -49,6 +49,8 @@ _GROUND_WITH_GRADE = 0.006  # prior SD of the part of ρ_s that varies with the 
 _STRETCH = 6  # windows without labels that may be a soil of their own
 _DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
+_LABEL = "give a 'soil' column (for one soil 'soil: {constant: field}' in the profile), or change the pull every few seconds"
+_ROUNDING = 1e-9  # of a nuisance term, which is of size 1
 _STRONG = 3.0  # the instruments' covariance over its error
 
 
@@ -65,6 +67,8 @@ class _Balance:
     slope_known: bool
     climb: Floats
     """m g sinθ, 0 where no slope is measured."""
+    stretch: Ints | None = None
+    """Of each row the stretch that has a resistance of its own, partialled out, too."""
 
 
 def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: Vehicle) -> Quantity:
@@ -106,14 +110,14 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     if by_grade > max(error / scale, considered):
         sentence += "; a resistance that varies with the grade would look the same: pull changing loads on level ground"
     if by_soil > 0.1 * scale:
-        sentence += "; soils of unlike resistance would look the same: give a 'soil' column, or pull changing loads on one soil"
+        sentence += f"; soils of unlike resistance would look the same: {_LABEL}"
     std = float(np.hypot(error, scale * np.hypot(considered, by_grade)))
-    if NORMAL_95 * std > abs(scale):
-        raise InputError(
-            f"the torque scale is known to {NORMAL_95 * std / abs(scale):.0%} only: an interval that includes 0 determines nothing",
-            file=logs[0].source,
-            hint="pull changing loads on level ground, or give pitch or acceleration_x",
-        )
+    if not NORMAL_95 * std <= abs(scale):
+        problem = f"the torque scale is known to {NORMAL_95 * std / abs(scale):.0%} only: an interval that includes 0 determines nothing"
+        hint = "pull changing loads on level ground, or give pitch or acceleration_x"
+        if by_soil > std / 2:
+            problem, hint = f"{problem} (soils of unlike resistance would look the same)", _LABEL
+        raise InputError(problem, file=logs[0].source, hint=hint)
     return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
 
 
@@ -131,14 +135,12 @@ def _by_stretches(table: Windows, rows: _Balance, scale: float) -> float:
     """How far ``scale`` is from that with a resistance for each short stretch of a log, where no label says which soil it is; else 0."""
     if any(table.soil):
         return 0.0
-    stretch = np.arange(len(rows.thrust)) // _STRETCH
-    own = (stretch[:, None] == np.arange(stretch[-1] + 1)).astype(float)
-    return abs(_fit(replace(rows, nuisance=np.column_stack([rows.nuisance, own])))[0] - scale)
+    return abs(_fit(replace(rows, stretch=np.arange(len(rows.thrust)) // _STRETCH))[0] - scale)
 
 
 def _with_grade(vehicle: Vehicle, rows: _Balance, weight: Floats) -> float:
     """Relative SD of K by a resistance that varies with the grade."""
-    climb = _centered(rows.climb[:, None], rows.nuisance, weight)[:, 0]
+    climb = _centered(rows.climb[:, None], rows, weight)[:, 0]
     size = float(np.sqrt(np.mean(weight * climb**2)))
     if not size:
         return 0.0
@@ -197,17 +199,29 @@ def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
     return _Balance(thrust, losses, first, other, nuisance, np.mean(slips, axis=1) * way, known, climb)
 
 
-def _centered(values: Floats, nuisance: Floats, weight: Floats) -> Floats:
+def _centered(values: Floats, rows: _Balance, weight: Floats) -> Floats:
     """Values (n, k) less their weighted regression on the nuisance terms."""
+    nuisance = rows.nuisance
+    if (
+        rows.stretch is not None
+    ):  # less their means: the same as a term for each, of which a day has thousands
+        values, nuisance = (_within(part, rows.stretch, weight) for part in (values, nuisance))
+        nuisance = np.where(np.abs(nuisance) < _ROUNDING, 0.0, nuisance)
     root = np.sqrt(weight)[:, None]
     fit = np.linalg.lstsq(nuisance * root, values * root, rcond=None)[0]
     return values - nuisance @ fit
 
 
+def _within(values: Floats, stretch: Ints, weight: Floats) -> Floats:
+    """Values (n, k) less their weighted mean over their stretch."""
+    sums = np.column_stack([np.bincount(stretch, weight * column) for column in values.T])
+    return values - (sums / np.bincount(stretch, weight)[:, None])[stretch]
+
+
 def _slope(rows: _Balance, weight: Floats) -> tuple[float, float, Floats]:
     """K, the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance terms removed."""
     table = np.column_stack([rows.thrust, rows.losses, rows.force, rows.other])
-    x, losses, y1, y2 = _centered(table, rows.nuisance, weight).T
+    x, losses, y1, y2 = _centered(table, rows, weight).T
     strength = float(np.mean(weight * y1 * y2))
     instrument = (y1 + y2) / 2
     # X = K (Y + losses): the losses are known, so they are added to Y in the denominator.
@@ -218,7 +232,7 @@ def _slope(rows: _Balance, weight: Floats) -> tuple[float, float, Floats]:
 
 def _no_strength(rows: _Balance, weight: Floats) -> float:
     """Standard error of the covariance of the two measures of Y if they had nothing in common."""
-    y1, y2 = _centered(np.column_stack([rows.force, rows.other]), rows.nuisance, weight).T
+    y1, y2 = _centered(np.column_stack([rows.force, rows.other]), rows, weight).T
     return float(np.sqrt(np.mean(weight * y1**2) * np.mean(weight * y2**2) / len(weight)))
 
 
@@ -233,7 +247,7 @@ def _jackknife(rows: _Balance, weight: Floats) -> float:
 
 def _partial_slope(values: Floats, rows: _Balance, weight: Floats) -> float:
     """Slope of values (n,) over Y, nuisance terms removed."""
-    value, y1, y2 = _centered(np.column_stack([values, rows.force, rows.other]), rows.nuisance, weight).T
+    value, y1, y2 = _centered(np.column_stack([values, rows.force, rows.other]), rows, weight).T
     return float(np.sum(weight * value * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
 
 
@@ -246,7 +260,7 @@ def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats, residual: Fl
         return 0.0
     slope = vehicle.mass * GRAVITY * (_SLOPE if stated is None else stated)
     slope = max(slope, float(np.sqrt(np.mean(weight * residual**2))))
-    force = _centered(rows.force[:, None], rows.nuisance, weight)[:, 0]
+    force = _centered(rows.force[:, None], rows, weight)[:, 0]
     return _WITH_PUSH * slope / max(float(np.sqrt(np.mean(weight * force**2))), 1e-12)
 
 
