@@ -192,7 +192,14 @@ def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str
 
 
 @pytest.mark.parametrize(
-    "stated", [{"uncertainty": {"drawbar_offset": "20 N"}}, {"sensors": {"drawbar_force": "5 N"}}, {}]
+    "stated",
+    [
+        {"uncertainty": {"drawbar_offset": "20 N"}},
+        {"uncertainty": {"drawbar_gain": 0.02}},
+        {"sensors": {"drawbar_force": "5 N"}},
+        {"calibration": {"drawbar_offset": "20 N"}},
+        {},
+    ],
 )
 def test_a_cell_of_the_vehicle_file_that_reads_0_throughout_is_named(stated: dict[str, object]) -> None:
     columns = drive()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.sides import side_warnings
+from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.simulation import families, simulate
 from terragrip.vehicle import Vehicle
 
@@ -83,6 +83,17 @@ def test_exchanged_torques_need_a_rate_of_turn() -> None:
     log = skidding()
     unseen = replace(log, channels={n: v for n, v in log.channels.items() if n != "angular_velocity_z"})
     assert exchanged(unseen, "fl", "fr") == []
+
+
+@pytest.mark.parametrize(("size", "said"), [(1.0, True), (0.05, False)])
+def test_torques_that_hardly_differ_in_turns_show_no_exchange(size: float, said: bool) -> None:
+    """Differences below a thirtieth of a wheel's load may be the ground's, or the sensors'."""
+    log, torques = skidding(), {}
+    for left, right in (("fl", "fr"), ("rl", "rr")):
+        torques[f"drive_torque_{left}"] = size * log.channels[f"drive_torque_{right}"]
+        torques[f"drive_torque_{right}"] = size * log.channels[f"drive_torque_{left}"]
+    turn = log.channels["angular_velocity_z"]
+    assert bool(exchanged_torques(log.with_channels(**torques), vehicle(), turn)) is said
 
 
 @pytest.mark.parametrize(("gain", "said"), [(0.9, False), (0.75, True), (1.35, True)])
