@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import terragrip as tg
 from terragrip.cli import main
+from terragrip.from_log import follows
 
 VEHICLE = """\
 mass: 20 kg
@@ -245,3 +248,31 @@ def test_a_drive_that_was_cut_into_files_is_said(
         == 0
     )
     assert "begins where" not in capsys.readouterr().out
+
+
+def test_a_drive_that_was_cut_into_files_by_dates_is_said(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Times of such a log count from its own beginning."""
+    for number in range(2):
+        part = log_of(0.1, number)
+        part["time"] = pd.Timestamp("2026-03-01T10:00:00Z") + pd.to_timedelta(
+            part["time"] + 30.0 * number, unit="s"
+        )
+        part.to_csv(place / f"cut{number}.csv", index=False)
+    logs = [str(place / f"cut{number}.csv") for number in range(2)]
+    assert main(["estimate", *logs, "--vehicle", str(place / "vehicle.yaml"), "-o", str(place / "out")]) == 0
+    assert "cut1.csv begins where cut0.csv ends" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("step", "gap", "said"),
+    [(0.1, 1.9, True), (0.1, 2.1, False), (1.0, 2.9, True), (1.0, 3.1, False), (0.1, -0.1, False)],
+)
+def test_files_of_one_drive_may_lack_three_rows_or_two_seconds(
+    tmp_path: Path, step: float, gap: float, said: bool
+) -> None:
+    time = step * np.arange(20)
+    for name, values in (("first", time), ("second", time[-1] + gap + time)):
+        pq.write_table(pa.table({"time": values}), tmp_path / name)
+    assert follows(tmp_path / "second", tmp_path / "first") is said

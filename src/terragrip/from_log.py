@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 _CUT = 2.0  # s, or three rows, between the files of one drive: what a logger loses when it begins another
-_FEW, _FROM_ZERO = 3, 1.0  # rows; s: a time that begins below it was set anew
+_FEW = 3  # rows
 
 
 def estimate_file(
@@ -90,25 +90,21 @@ def estimate_file(
 
 
 def follows(second: PathLike, first: PathLike) -> bool:
-    """Whether the rows of one Parquet file of estimates begin where those of another end: by clock time, or by a time that does not begin
-    anew."""
+    """Whether the rows of one Parquet file of estimates begin where those of another end: by clock time, or by times that run on."""
     (clock, before), (other, time) = (_times(file) for file in (first, second))
-    if min(len(before), len(time)) < _FEW or (clock is None) != (other is None):
+    if min(len(before), len(time)) < _FEW:
         return False
-    if clock is None or other is None:
-        between = float(time[0] - before[-1]) if time[0] > _FROM_ZERO else 0.0
-    else:
-        between = other + float(time[0]) - clock - float(before[-1])
+    between = other - clock + float(time[0] - before[-1])
     return 0.0 < between <= max(_CUT, 3 * float(np.median(np.diff(before))))
 
 
-def _times(file: PathLike) -> tuple[float | None, Floats]:
-    """Clock time of time 0 [s since 1970] of a file of estimates, None if it has none, and its time [s]."""
+def _times(file: PathLike) -> tuple[float, Floats]:
+    """Clock time of time 0 [s since 1970] of a file of estimates, 0 if it has none, and its time [s]."""
     import pyarrow.parquet as pq
 
-    zero = Estimates.read_about(file).get("time_zero")
+    zero = (Estimates.read_about(file).get("recording") or {}).get("time_zero")
     time = pq.read_table(os.fspath(file), columns=["time"]).column("time").to_numpy()
-    return None if zero is None else datetime.fromisoformat(zero).timestamp(), time
+    return 0.0 if zero is None else datetime.fromisoformat(zero).timestamp(), time
 
 
 def _labelled(parts: Iterator[Estimates], labels: Mapping[str, str]) -> Iterator[Estimates]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terragrip.live.clock import SourceClock
+from terragrip.live.clock import Pace, SourceClock
 from terragrip.live.counts import Counts
 from terragrip.live.reorder import Reorder
 
@@ -223,3 +223,24 @@ class TestClock:
         assert times == [1000.0, 1001.0, 1002.0]
         times, _, _ = self.run([(1000.0 + k, 999.97 + k) for k in range(3)], align=True)
         assert times == [999.97, 1000.97, 1001.97]
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        ([0.0, 600.0, 1200.0, 1800.0, 2400.0], 1000.0),  # ms, given as s: every .6 s
+        ([0.0, 0.6, 1.2, 1.8, 2.4], None),
+        ([0.0, 600.0, 600.6, 601.2, 601.8], None),  # a clock that is set while the vehicle drives
+        ([0.0, 60.0, 180.0, 480.0, 1200.0], None),  # set again and again: no one factor
+    ],
+)
+def test_a_clock_that_runs_far_too_fast_is_named_once(stamps: list[float], said: float | None) -> None:
+    pace = Pace()
+    found = [pace.wrong(0.6 * k, stamp) for k, stamp in enumerate(stamps)]
+    assert [one for one in found if one is not None] == ([] if said is None else [pytest.approx(said)])
+
+
+def test_samples_that_were_held_up_and_come_at_once_are_no_fast_clock() -> None:
+    pace = Pace()
+    late = [pace.wrong(10.0 + 0.001 * k, 0.1 * k) for k in range(100)]
+    assert late + [pace.wrong(10.1 + 0.1 * k, 10.0 + 0.1 * k) for k in range(100)] == [None] * 200
