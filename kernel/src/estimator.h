@@ -207,8 +207,8 @@ typedef struct { /* what follows from the settings alone */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
     int32_t holds;                  /* some channel is held */
-    int32_t warps, slopes;          /* of the driven wheels: by how many they are more than the trends, see warp.c; trends but the mean */
-    tg_real pulls[8], share;        /* wheel: 1 where driven and not merely measured; 1 over their number */
+    int32_t warps, slopes;          /* driven wheels beyond their trends, see warp.c; trends besides the mean, or 0 where hidden.c does not look */
+    tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
     tg_real inverse_radius[8];      /* wheel, of the rolling radius */
     tg_real at_rest[8];             /* wheel: its share of the driven wheels' load at rest */
     tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */

@@ -113,7 +113,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
     const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
     const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row is less certain than usual */
     for (int i = 0; i < TG_MAX_WHEELS; i++) all += tgi_square(slip[i]) * c->share;
-    const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* of radii and ruts a spinning wheel's slip tells nothing */
+    const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* a spinning wheel's slip tells nothing of radii and ruts */
     w->sure = w->sure > 0 ? w->sure + gain * (sure - w->sure) : sure;
     const tg_real learned = gain * sure / w->sure;
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
@@ -149,7 +149,8 @@ static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { r
 
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
  * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
- * those slips relative to the wheels' slip in the same rows, since a load moves a small slip by little and a large one by much. */
+ * those slips relative to the wheels' slip in the same rows (at most 1), since a load moves a small slip by little and a large one by
+ * much. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
@@ -163,6 +164,6 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;
     }
-    const tg_real hidden = (k->bend_spread - explained) * relative / beyond_line(k, relative, 1);
+    const tg_real hidden = (k->bend_spread - explained) * relative;
     return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square(hidden);
 }

@@ -150,13 +150,16 @@ def test_numbers_of_the_other_byte_order_are_named() -> None:
         }
     ).payload
     unpack = unpacker(payload)
-    for sample in (
+    right = [
         (0.02, 2.61, 2.58, 0.5),
         (1e9, math.nan, 1e-200, 0.0),
         (3.0, 1e300, 2.0, 1.0),
         (1e-30, 1e-40, 2.0, 1e-25),
         (1e25, 3.0, 1e25, 1.0),
-    ):
+        (0.0, 0.0, 1e300, 1.0),
+        (math.inf, math.inf, -math.inf, 1.0),
+    ]
+    for sample in right:
         assert unpack(struct.pack("<4d", *sample))[0]["t"] == sample[0]
     with pytest.raises(Unreadable, match="byte_order"):
         unpack(struct.pack(">4d", 0.02, 2.61, 2.58, 0.5))
