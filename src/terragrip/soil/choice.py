@@ -140,20 +140,25 @@ def _parameters(form: str) -> tuple[dict[str, float], list[str]]:
 
 
 def _score(form: str, splits: Sequence[Split]) -> FormScore:
+    """Cross-validated error of a form: the starts of all folds are solved at once."""
     model = CURVES[FORMS[form][0]]
     held, free = _parameters(form)
+    kept = [fold for fold in splits if np.count_nonzero(fold[2]) >= len(free) and fold[5].any()]
+    if not kept:
+        raise InputError("the runs are too unlike to compare forms on one left out", hint="drive more runs")
+    begin = [starts(model, free, np.where(weight > 0, mean, np.nan)) for _, mean, weight, *_ in kept]
+    slip, mean, weight = (
+        np.concatenate([np.tile(fold[k], (len(b), 1)) for fold, b in zip(kept, begin, strict=True)])
+        for k in range(3)
+    )
+    x, cost = solve(model, free, held, slip, mean, weight, np.concatenate(begin))
+    x, cost = x.reshape(len(kept), -1, len(free)), cost.reshape(len(kept), -1)
+    best = x[np.arange(len(kept)), np.argmin(cost, axis=1)]
     errors = []
-    for slip, mean, weight, test_slip, test_mean, test_weight in splits:
-        if np.count_nonzero(weight) < len(free) or not test_weight.any():
-            continue
-        begin = starts(model, free, np.where(weight > 0, mean, np.nan))
-        many = np.ones((len(begin), 1))
-        x, cost = solve(model, free, held, many * slip, many * mean, many * weight, begin)
-        result = {**held, **dict(zip(free, x[int(np.argmin(cost))], strict=True))}
+    for fitted, (*_, test_slip, test_mean, test_weight) in zip(best, kept, strict=True):
+        result = {**held, **dict(zip(free, fitted, strict=True))}
         drop = result.pop(INTERCEPT, 0.0)
         off = (model.value(test_slip, result, drop) - test_mean)[test_weight > 0]
         errors.append(float(np.sqrt(np.mean(off**2))))
-    if not errors:
-        raise InputError("the runs are too unlike to compare forms on one left out", hint="drive more runs")
     error = float(np.mean(errors))
     return FormScore(form, error, float(np.std(errors) / np.sqrt(len(errors))), len(free))

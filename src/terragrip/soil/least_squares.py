@@ -46,10 +46,10 @@ def solve(
     damping = np.full(len(x), 1e-3)
     for _ in range(iterations):
         jacobian = _jacobian(curve, x, now, lower, upper)
-        gradient = np.einsum("bjk,bj->bk", jacobian, target - now)
-        normal = np.einsum("bjk,bjl->bkl", jacobian, jacobian)
+        gradient = np.einsum("bkj,bj->bk", jacobian, target - now)
+        normal = np.einsum("bkj,blj->bkl", jacobian, jacobian)
         scale = np.maximum(np.einsum("bkk->bk", normal), 1e-12)
-        damped = normal + np.einsum("bk,kl->bkl", damping[:, None] * scale, np.eye(len(free)))
+        damped = normal + (damping[:, None] * scale)[..., None] * np.eye(len(free))
         step = np.linalg.solve(damped, gradient[..., None])[..., 0]
         trial = np.clip(x + step, lower, upper)
         value = curve(trial)
@@ -68,7 +68,7 @@ def solve(
 
 
 def _jacobian(curve, x: Floats, now: Floats, lower: Floats, upper: Floats) -> Floats:  # type: ignore[no-untyped-def]
-    """Forward differences, backward at an upper bound: (sets, bins, free)."""
+    """Forward differences, backward at an upper bound: (sets, free, bins), bins last because sums run over them."""
     columns = []
     for i in range(x.shape[1]):
         h = 1e-6 * np.maximum(np.abs(x[:, i]), 1e-2)
@@ -76,7 +76,7 @@ def _jacobian(curve, x: Floats, now: Floats, lower: Floats, upper: Floats) -> Fl
         moved = x.copy()
         moved[:, i] += h
         columns.append((curve(moved) - now) / h[:, None])
-    return np.stack(columns, axis=-1)
+    return np.stack(columns, axis=1)
 
 
 def starts(model: CurveModel, free: Sequence[str], means: Floats) -> Floats:
