@@ -1,11 +1,10 @@
 """Build the documentation site: the pages of docs/, and the reference made from the code.
 
-    python docs/site/make.py [-o build/docs] [--check]          # make docs
+    python docs/site/make.py [-o build/docs]          # make docs
 
 Pages are copied into a folder beside the output; what the code itself knows (commands, keys, channels, columns, the Python and
 C interfaces, licences) is written there as pages too, anew at each build. Sphinx makes HTML of it, with every warning an error: a
 link that leads nowhere, a page that the table of contents lacks. Nothing is loaded from the network, when built or when read.
---check looks for these and writes no HTML, in half of the time.
 """
 
 from __future__ import annotations
@@ -102,14 +101,14 @@ def assemble(folder: Path) -> None:
     shutil.copy(HERE / "conf.py", folder)
 
 
-def build(source: Path, target: Path, builder: str) -> int:
-    """Sphinx over the assembled folder; its exit code."""
+def build(source: Path, target: Path) -> int:
+    """HTML by Sphinx of the assembled folder; its exit code."""
     from sphinx.cmd.build import build_main
 
     code = build_main(
-        ["--builder", builder, "--quiet", "--fail-on-warning", "--keep-going", str(source), str(target)]
+        ["--builder", "html", "--quiet", "--fail-on-warning", "--keep-going", str(source), str(target)]
     )
-    if code == 0 and builder == "html":
+    if code == 0:
         shutil.copy(target / "README.html", target / "index.html")
         shutil.rmtree(target / ".doctrees", ignore_errors=True)
     return code
@@ -118,15 +117,14 @@ def build(source: Path, target: Path, builder: str) -> int:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, default=DOCS.parent / "build" / "docs")
-    parser.add_argument("--check", action="store_true", help="look for faults, and write no HTML")
     wanted = parser.parse_args()
     target: Path = wanted.output.absolute()
     source = target.with_name(f"{target.name}-source")
     for folder in (source, target):
         shutil.rmtree(folder, ignore_errors=True)
     assemble(source)
-    code = build(source, target, "dummy" if wanted.check else "html")
-    if code == 0 and not wanted.check:
+    code = build(source, target)
+    if code == 0:
         print(f"The documentation is {target / 'index.html'}")
     return code
 
