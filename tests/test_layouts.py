@@ -46,20 +46,26 @@ def machine_of(layout: str) -> tuple[Recording, tg.Vehicle]:
     return recording.with_channels(latitude=45 + way * 6.4e-6, longitude=12 + way * 9e-6), vehicle
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     "layout",
-    [
-        # the robots of other tests have two driven wheels, and an axle that is not driven comes with the engine's torque
-        pytest.param(name, marks=[pytest.mark.long] if name in ("two-wheel drive", "skid steer") else [])
-        for name in LAYOUTS
-    ],
+    # the robots of other tests have two driven wheels, and an axle that is not driven comes with the engine's torque
+    ["two-wheel drive by engine torque", "four-wheel drive by engine torque", "six wheels"],
 )
-def test_every_command_works(
-    layout: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
+def test_every_command_works(layout: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_every_command(layout, tmp_path, capsys)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_command_works_and_draws(
+    layout: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    run_every_command(layout, tmp_path, capsys)
+
+
+def run_every_command(layout: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("geopandas", reason="needs terragrip[geo]")
-    if layout == "four-wheel drive by engine torque":  # drawn with two wheels and with six
-        request.getfixturevalue("undrawn")
     import geopandas
 
     recording, vehicle = machine_of(layout)
