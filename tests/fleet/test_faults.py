@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -54,33 +53,60 @@ def at_work(place: Path, parent: int) -> list[psutil.Process]:
     return busy
 
 
-def test_a_worker_that_is_killed_in_mid_task(place: Path) -> None:
+class Fault(threading.Thread):
+    """Does something to the processes below this one that are at work, as soon as there are some: unless told otherwise it kills them."""
+
+    def __init__(self, place: Path, cause: Callable[[list[psutil.Process]], None] | None = None) -> None:
+        super().__init__(daemon=True)
+        self._place, self._cause = place, cause or _kill
+        self.start()
+
+    def run(self) -> None:
+        busy: list[psutil.Process] = []  # of the moment of looking: a task may end before the next look
+        until(lambda: busy.extend(at_work(self._place, os.getpid())) or busy)
+        self._cause(busy)
+
+
+def _kill(processes: list[psutil.Process]) -> None:
+    for one in processes:
+        one.kill()
+
+
+@pytest.fixture
+def scratch(place: Path) -> Iterator[None]:
+    """The folders of workers that a call in this process starts lie in `place`."""
+    import dask
+
+    with dask.config.set({"temporary-directory": str(place / "scratch")}):
+        yield
+
+
+@pytest.mark.usefixtures("scratch")
+def test_a_worker_that_is_killed_in_mid_task(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
-    process = start(place)
-    seen: list[
-        psutil.Process
-    ] = []  # what was at work in the moment of looking: a task may end before the next look
-    until(lambda: seen.extend(at_work(place, process.pid)) or seen or process.poll() is not None)
-    assert seen, "no task was seen at work"
-    seen[0].send_signal(signal.SIGKILL)
-    output, errors = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, errors) == (0, "")
-    assert "0 failed" in output
+    fault = Fault(place)
+    code = main(call(place))
+    assert not fault.is_alive(), "no task was seen at work"
+    said = capsys.readouterr()
+    assert (code, said.err) == (0, "")
+    assert "0 failed" in said.out
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
 
 
-def test_a_log_that_needs_more_memory_than_a_worker_has(place: Path) -> None:
+@pytest.mark.usefixtures("scratch")
+def test_a_log_that_needs_more_memory_than_a_worker_has(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     rows = 12_000_000  # 0.4 GB of numbers in a file of 0.1 MB: steps of time are quickly compressed
     ones = np.ones(rows, dtype=np.uint8)
     channels = dict.fromkeys(("ground_speed", "wheel_speed_l", "wheel_speed_r"), ones)
     time_column = np.repeat(np.arange(rows // 1000, dtype=np.int32), 1000)
     scipy.io.savemat(place / "logs/a/bomb.mat", {"time": time_column, **channels}, do_compression=True)
-    code, output, errors = fleet(
-        place, place / "logs/**/*.*", "--vehicle", place / "Heros.yaml", "--workers", 2, "--memory", "420MB"
-    )
-    assert (code, errors) == (0, "")
-    assert "6 estimated, 0 unchanged, 1 failed" in output
+    code = main(call(place, place / "logs/**/*.*", "--workers", 1, "--memory", "420MB"))
+    said = capsys.readouterr()
+    assert (code, said.err) == (0, "")
+    assert "6 estimated, 0 unchanged, 1 failed" in said.out
     data, reasons = whole(place / "out")
     assert len(data) == 6
     assert list(reasons) == ["bomb.mat"]
@@ -89,7 +115,7 @@ def test_a_log_that_needs_more_memory_than_a_worker_has(place: Path) -> None:
 
 def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
-    process = start(place, env=environment(place))
+    process = start(place, "--workers", 1)
     notes = place / "out/state/logs"
     until(lambda: notes.is_dir() and len(list(notes.iterdir())) >= 1)
     family = [*psutil.Process(process.pid).children(recursive=True), psutil.Process(process.pid)]
@@ -104,36 +130,27 @@ def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixtur
     assert (len(rows), reasons) == (7, {})
 
 
-def test_a_scheduler_that_is_lost_and_restarted(place: Path, started: list[subprocess.Popen[bytes]]) -> None:
+def test_a_scheduler_that_is_lost_and_restarted(
+    place: Path, started: list[subprocess.Popen[bytes]], capsys: pytest.CaptureFixture[str]
+) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
     port = free_port()
     started += serve(place, port)
-    process = start(place, "--scheduler", f"tcp://127.0.0.1:{port}")
-    until(lambda: at_work(place, os.getpid()) or process.poll() is not None)
-    for one in started:
-        one.kill()
-        one.wait()
-    started += serve(place, port)
-    output, errors = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, errors) == (0, "")
-    assert "0 failed" in output
+
+    def restart(_: object) -> None:
+        for one in started:
+            one.kill()
+            one.wait()
+        started.extend(serve(place, port))
+
+    fault = Fault(place, restart)
+    code = main(call(place, "--scheduler", f"tcp://127.0.0.1:{port}"))
+    fault.join(PATIENCE)
+    said = capsys.readouterr()
+    assert (code, said.err) == (0, "")
+    assert "0 failed" in said.out
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
-
-
-class Killer(threading.Thread):
-    """Kills the processes below this one that are at work as soon as there are some; before that it calls ``prepare``."""
-
-    def __init__(self, place: Path, prepare: Callable[[], None] = lambda: None) -> None:
-        super().__init__(daemon=True)
-        self._place, self._prepare = place, prepare
-        self.start()
-
-    def run(self) -> None:
-        until(lambda: at_work(self._place, os.getpid()))
-        self._prepare()
-        for one in at_work(self._place, os.getpid()):
-            one.kill()
 
 
 def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
@@ -146,7 +163,7 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     port = free_port()
     started += serve(place, port)
     monkeypatch.setattr("terragrip.fleet.cluster.PATIENCE", 3.0)
-    Killer(place)
+    Fault(place)
     words = call(place, "--scheduler", f"tcp://127.0.0.1:{port}", "--quiet")
     assert main(words) == 2
     errors = capsys.readouterr().err
@@ -167,6 +184,7 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     assert json.loads(notes[-1].read_text())["log"] == "long.csv"
 
 
+@pytest.mark.usefixtures("scratch")
 def test_a_worker_here_that_dask_gives_up_is_started_anew(place: Path) -> None:
     """The only worker is killed, and its nanny does not bring it back."""
     import dask
@@ -174,15 +192,15 @@ def test_a_worker_here_that_dask_gives_up_is_started_anew(place: Path) -> None:
 
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
 
-    def abandon() -> None:
+    def abandon(busy: list[psutil.Process]) -> None:
         for nanny in Nanny._instances:
             nanny.close_gracefully()
+        _kill(busy)
 
-    killer = Killer(place, abandon)
-    scratch = str(place / "scratch")
-    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 s", "temporary-directory": scratch}):
+    fault = Fault(place, abandon)
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 s"}):
         assert main(call(place, "--workers", 1, "--quiet")) == 0
-    assert not killer.is_alive()
+    assert not fault.is_alive()
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
 

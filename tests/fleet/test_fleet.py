@@ -106,12 +106,13 @@ def test_the_numbers_for_prometheus_are_those_of_the_data_set(place: Path, ran: 
     assert sorted(pd.read_parquet(place / "out/summary.parquet")["nis"]) == pytest.approx(sorted(of_log))
 
 
-def test_a_fleet_of_two_machines_and_three_days(place: Path) -> None:
+def test_a_fleet_of_two_machines_and_three_days(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     index = place / "index.csv"
     index.write_text("log,vehicle\n" + "".join(f"drive{n}.csv,Thorvald.yaml\n" for n in (1, 4)))
-    code, said, errors = fleet(place, "--index", index, "--vehicle", place / "Heros.yaml")
-    assert (code, errors) == (0, "")
-    assert "6 estimated, 0 unchanged, 0 failed" in said
+    code = main(call(place, "--index", index, "--vehicle", place / "Heros.yaml"))
+    said = capsys.readouterr()
+    assert (code, said.err) == (0, "")
+    assert "6 estimated, 0 unchanged, 0 failed" in said.out
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (6, {})
 
