@@ -297,7 +297,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     report_adaptation(e, out->value);
     const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
-    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing ? 0 : travelled * dt);
+    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : travelled * dt); /* nothing shows how far it went in a gap */
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);

@@ -275,7 +275,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
 void tgi_find_silent(tg_estimator *e, double time);
-void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
+void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);

@@ -2,6 +2,7 @@
 #include "estimator.h"
 
 #define TG_LEAST_SAMPLES 4 /* before any can be called a spike */
+#define TG_PAUSE 10          /* intervals, beyond a gap: longer is a pause */
 #define TG_CHATTER ((tg_real)2 / 3)
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
@@ -21,21 +22,30 @@ static tg_real before_spike(const tg_hold *h, tg_real x)
     return h->spike > 0 && tgi_fabs(x - h->raw) < tgi_fabs(x - h->calm) ? h->raw : h->calm;
 }
 
+/* The first sample, or the first after a pause, which is no increment: nothing shows what came before it. */
+static void begin(tg_hold *h, tg_real x, tg_real noise)
+{
+    h->fresh = h->count > 0;
+    h->value = h->calm = h->mean = x;
+    h->variance = noise * noise;
+    h->rate = h->bend = h->spike = 0;
+}
+
 /* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
  * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
  * it enters the mean square clipped. `rate`: the change a second that is no spike. `moving`: else the increments are those of a
  * standstill, which show nothing of the start. */
-void tgi_hold_update(tg_hold *h, const tg_tuned *k, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
+void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving)
 {
+    const tg_tuned *const k = &s->tuned;
+    const tg_real interval = (tg_real)(time - h->time);
     h->fresh = 0;
     h->mean = h->calm;
     if (isnan(x)) return;
-    if (h->count == 0) {
-        h->value = h->calm = h->mean = x;
-        h->variance = noise * noise;
-    } else {
-        const tg_real interval = (tg_real)(time - h->time), before = before_spike(h, x);
+    if (h->count == 0 || interval > s->gap + TG_PAUSE * h->interval) begin(h, x, noise);
+    else {
+        const tg_real before = before_spike(h, x);
         tg_real change = tgi_square(x - before), bound = k->spike * k->spike * (h->level + 2 * noise * noise) + tgi_square(rate * interval);
         h->spike = 0;
         if (h->count > TG_LEAST_SAMPLES && change > bound) {
@@ -181,7 +191,7 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
     memset(drive, 0, sizeof *drive);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const int32_t slot = TG_DRIVE_TORQUE + i;
-        if (s->driven[i]) tgi_hold_update(&e->torque[i], &s->tuned, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
+        if (s->driven[i]) tgi_hold_update(&e->torque[i], s, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
     }
     judge_leaps(e, row->time, dt);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
@@ -191,8 +201,8 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
         drive->mean_torque[i] = h->mean;
         row->outlier |= h->spike > 0;
     }
-    tgi_hold_update(&e->drawbar, &s->tuned, row->value[TG_DRAWBAR_FORCE], row->time, dt, s->noise[TG_DRAWBAR_FORCE], 0, !e->standing);
-    tgi_hold_update(&e->pitch, &s->tuned, row->value[TG_PITCH], row->time, dt, s->noise[TG_PITCH], 0, !e->standing);
+    tgi_hold_update(&e->drawbar, s, row->value[TG_DRAWBAR_FORCE], row->time, dt, s->noise[TG_DRAWBAR_FORCE], 0, !e->standing);
+    tgi_hold_update(&e->pitch, s, row->value[TG_PITCH], row->time, dt, s->noise[TG_PITCH], 0, !e->standing);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.calm;
     drive->mean_drawbar = e->drawbar.mean;

@@ -12,7 +12,7 @@ static void bounded_input(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot
     const tg_real x = row->value[slot];
     const int32_t defect = x < least || x > most;
     row->outlier |= defect;
-    tgi_hold_update(h, &e->settings.tuned, defect ? (tg_real)NAN : x, row->time, 0, e->settings.noise[slot], 0, !e->standing);
+    tgi_hold_update(h, &e->settings, defect ? (tg_real)NAN : x, row->time, 0, e->settings.noise[slot], 0, !e->standing);
     row->outlier |= h->spike > 0 && h->time == row->time;
 }
 
@@ -79,7 +79,7 @@ static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_
     tg_real rest = weight, computed = 0, share = 0;
     for (int32_t k = 0; k < s->axles; k++) {
         tg_hold *h = &e->axle_load[k];
-        tgi_hold_update(h, &s->tuned, row->value[TG_VERTICAL_LOAD + k], row->time, 0, s->noise[TG_VERTICAL_LOAD + k], 0, !e->standing);
+        tgi_hold_update(h, s, row->value[TG_VERTICAL_LOAD + k], row->time, 0, s->noise[TG_VERTICAL_LOAD + k], 0, !e->standing);
         measured[k] = h->count > 0 && row->time - h->time <= 1;
         any |= measured[k];
         if (measured[k]) {

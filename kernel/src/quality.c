@@ -61,7 +61,7 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
     for (int32_t i = 0; i <= n; i++) {
         const int32_t slot = i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED;
         tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
-        tgi_hold_update(h, &s->tuned, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile, !e->standing);
+        tgi_hold_update(h, s, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile, !e->standing);
         row->doubt[i] = h->time == row->time ? h->spike : 0;
         row->outlier |= row->doubt[i] > 0;
     }

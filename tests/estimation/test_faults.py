@@ -40,6 +40,15 @@ def test_a_long_gap_is_flagged_on_both_sides_and_widens(method):
     assert np.abs(estimates["adhesion_rr"] - base.truth["adhesion_rr"])[1300:].mean() < 0.02
 
 
+def test_a_pause_of_the_logger_is_over_a_second_after_it():
+    """It is neither a distance driven nor an increment of the torques, however long it was."""
+    base = drive(40.0).recording
+    whole, paused = run(base), run(delayed(base, 20.0, 8 * 3600.0))
+    for name in ("soil_resistance_std", "efficiency_rr_std"):
+        assert (paused[name][2100:] < 1.2 * whole[name][2100:]).all()
+    assert np.abs(paused["soil_resistance"] - whole["soil_resistance"])[2100:].max() < 0.002
+
+
 def test_a_short_gap_only_widens():
     estimates = run(delayed(drive(20.0).recording, 10.0, 1.5))
     assert not (estimates["event"] == "gap").any()
