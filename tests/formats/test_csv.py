@@ -101,6 +101,17 @@ def test_units_that_the_file_states_are_converted(tmp_path: Path, header: str) -
     np.testing.assert_allclose(recording["drawbar_force"], [1500, 2000])
 
 
+@pytest.mark.parametrize(
+    "header",
+    ["time [s],v [km/h],w[0],w[1]", "time [s],v [km/h],w(1),w(2)", "time [s],v [km/h],w (L),w (R)"],
+)
+def test_an_index_or_a_letter_of_a_side_is_no_unit(tmp_path: Path, header: str) -> None:
+    """'1' is a unit and 'L' is litres, but not beside 'w[0]' and 'w (R)'."""
+    table = read_table(put(tmp_path, f"{header}\n0,3.6,60,1.5\n2,7.2,30,2\n"))
+    assert table.units == {"time": "s", "v": "km/h"}
+    assert list(table.columns)[2:] == header.split(",")[2:]
+
+
 def test_dates_in_the_time_column(tmp_path: Path) -> None:
     rows = "".join(f"2021-05-04 10:00:0{k}.5,1,2\n" for k in range(3))
     recording = read(put(tmp_path, "time,ground_speed,wheel_speed_l\n" + rows))

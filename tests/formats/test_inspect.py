@@ -94,6 +94,25 @@ def test_a_ready_log_needs_no_profile(tmp_path: Path, log: pd.DataFrame) -> None
     json.dumps(inspection.to_dict(), allow_nan=False)
 
 
+@pytest.mark.parametrize(("name", "unit"), [("timestamp", "ms"), ("timestamp", "us"), ("time", "ms")])
+def test_stamps_of_a_processor_are_in_the_unit_that_a_drive_allows(
+    tmp_path: Path, log: pd.DataFrame, name: str, unit: str
+) -> None:
+    """Milliseconds or microseconds since the start, without a unit, are no seconds: a drive is not sampled every 10 s."""
+    factor = {"ms": 1e3, "us": 1e6}[unit]
+    stamps = (factor * log["time"] + 123_456_789).astype(np.int64)
+    table = log.drop(columns="time").add_prefix("my_")
+    table.insert(0, name, stamps)
+    path = tmp_path / "log.csv"
+    table.to_csv(path, index=False)
+    inspection = inspect(path)
+    assert inspection.time is not None
+    assert (inspection.time.column, inspection.time.unit) == (name, unit)
+    line = next(line for line in inspection.profile.splitlines() if line.startswith("time:"))
+    assert line.startswith(f"time: {{from: {name}, unit: {unit}}}   # ? no unit is stated")
+    assert any("no unit is stated" in warning for warning in inspection.warnings)
+
+
 def test_time_has_no_noise(tmp_path: Path, log: pd.DataFrame) -> None:
     path = tmp_path / "log.csv"
     log.to_csv(path, index=False)

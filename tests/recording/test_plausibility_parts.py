@@ -58,6 +58,17 @@ def test_a_ratio_of_wheel_to_ground_speed_names_the_unit_at_any_usual_slip(
     assert f"is {ratio / (1 - slip):.3g} times the ground speed" in note
 
 
+def test_where_two_units_give_one_ratio_both_are_named(vehicle: Vehicle) -> None:
+    """Rims of .165 m in m/s turn as many times too slowly as rims in revolutions per second: the slip decides between them."""
+    wheel = {"radius": 0.165, "inertia": 0.27}
+    small = Vehicle.from_dict(vehicle.to_dict() | {"wheel": wheel})
+    for slip in (0.0, 0.03, 0.15):
+        rims = {f"wheel_speed_{w}": SPEED / (1 - slip) for w in small.wheels}
+        note = said(small, ground_speed=SPEED, **rims)
+        assert "the rim's speed in m/s" in note
+        assert "revolutions per second" in note
+
+
 @pytest.mark.parametrize(
     ("beside", "words"), [(1.3, "deg/s"), (1.4, "check units"), (1 / 1.3, "deg/s"), (1 / 1.4, "check")]
 )

@@ -191,15 +191,31 @@ def _bare(cell: str) -> str:
 
 
 def _names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Column names without ``[unit]`` or ``(unit)`` behind them, where what stands there is a unit."""
+    """Column names without ``[unit]`` or ``(unit)`` behind them, where what stands there is a unit.
+
+    A number or a letter is none where a column of the same name has another one that is no unit: ``speed[1]`` beside ``speed[0]``,
+    ``torque (L)`` beside ``torque (R)``.
+    """
     bare: list[tuple[str, str]] = []
+    labels = set()
     for cell in header:
         match = _WITH_UNIT.match(cell)
-        unit = (match[2] or match[3] or "") if match else ""
-        bare.append((match[1], unit) if match and unit and is_common(unit) else (cell, ""))
+        name, unit = (match[1], match[2] or match[3] or "") if match else (cell, "")
+        if unit and not is_common(unit):
+            labels.add((name, _shape(unit)))
+            name, unit = cell, ""
+        bare.append((name, unit))
+    bare = [
+        (cell, "") if len(unit) == 1 and (name, _shape(unit)) in labels else (name, unit)
+        for cell, (name, unit) in zip(header, bare, strict=True)
+    ]
     names = [name for name, _ in bare]
     chosen = [cell if names.count(name) > 1 else name for cell, name in zip(header, names, strict=True)]
     return tuple(chosen), {c: u for c, (_, u) in zip(chosen, bare, strict=True) if u}
+
+
+def _shape(label: str) -> str:
+    return "number" if label.isdigit() else "letter" if len(label) == 1 and label.isalpha() else "text"
 
 
 def _lines(data: bytes, start: int = 0) -> Iterator[tuple[int, int, bytes]]:

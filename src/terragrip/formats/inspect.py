@@ -20,7 +20,7 @@ from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import days_in, notes_on, numbers_of
 from terragrip.formats.table import LogTable, Sparse
-from terragrip.formats.time_column import find_time
+from terragrip.formats.time_column import TimeColumn, find_time
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.columns import SINCE_1970
@@ -147,6 +147,8 @@ def inspect(
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
     warnings += days_in(seen.floats(), GENERAL)
+    if seen.stamp is not None and seen.stamp.doubt:
+        warnings.append(f"{seen.stamp.name}: {seen.stamp.doubt}")
     warnings += [*proposals.left_out, *quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels
@@ -195,7 +197,7 @@ class Seen:
 
     columns: dict[str, npt.NDArray[Any]]
     units: dict[str, str]
-    stamp: tuple[str, str] | None
+    stamp: TimeColumn | None
     base: Floats | None
     clocks: dict[str, Floats]
     since_1970: bool
@@ -211,7 +213,9 @@ class Seen:
             columns = {name: signal.values for name, signal in log.signals.items()}
             units = {name: signal.unit for name, signal in log.signals.items() if signal.unit}
             clocks = {name: signal.time - first for name, signal in log.signals.items()}
-            return cls(columns, units, (TIME, "s"), base - first, clocks, since_1970=False, whole=whole)
+            return cls(
+                columns, units, TimeColumn(TIME, "s"), base - first, clocks, since_1970=False, whole=whole
+            )
         written = {n: v for n, c in log.columns.items() if (v := numbers_of(c)) is not None}
         log = replace(log, columns={**log.columns, **written})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import yaml
 
 from terragrip.formats.recognition import Proposal
+from terragrip.formats.time_column import TimeColumn
 from terragrip.recording import Recording
 from terragrip.recording.schema import has_torque, wheel_names_in
 
@@ -90,7 +91,7 @@ def is_ready(recording: Recording) -> bool:
 
 def profile_text(
     file: str,
-    stamp: tuple[str, str] | None,
+    stamp: TimeColumn | None,
     proposals: Mapping[str, Proposal],
     *,
     since_1970: bool,
@@ -102,9 +103,9 @@ def profile_text(
     if stamp is None:
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
     else:
-        column, unit = stamp
-        entry: dict[str, object] = {"from": column} if unit == "s" else {"from": column, "unit": unit}
-        lines.append(f"time: {_flow(entry | ({'zero': 'first'} if since_1970 else {}))}")
+        entry = {"from": stamp.name} | ({} if stamp.unit == "s" else {"unit": stamp.unit})
+        doubt = f"   # ? {stamp.doubt}" if stamp.doubt else ""
+        lines.append(f"time: {_flow(entry | ({'zero': 'first'} if since_1970 else {}))}{doubt}")
     if dbc:
         lines.append(f"dbc: {json.dumps([os.path.abspath(file) for file in dbc], ensure_ascii=False)}")
     lines.append("channels:" if proposals else "channels: {}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,16 @@ from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
+_FINER = ("s", "ms", "us", "ns")
+_FIELD_RATE = 5.0  # s between samples: no log of a drive has more
+
+
+class TimeColumn(NamedTuple):
+    """The column that holds a log's time, its unit, and what is doubtful about that."""
+
+    name: str
+    unit: str
+    doubt: str = ""
 
 
 def find_time(
@@ -22,32 +33,33 @@ def find_time(
     dates: tuple[str, ...],
     units: Mapping[str, str],
     vocabulary: Vocabulary = GENERAL,
-) -> tuple[str, str] | None:
-    """The time column and its unit, or None: named or stated as a time, and running forward; a unit of ``units`` counts first.
+) -> TimeColumn | None:
+    """The time column, or None: named or stated as a time, and running forward; a unit of ``units`` counts first.
 
     ``numbers`` are the numeric columns (n,), ``dates`` those that hold dates with a time of day. Of several the one that counts from a
     calendar's zero comes first, then the one that stands first.
     """
-    best: tuple[float, str, str, bool] | None = None
+    best: tuple[float, TimeColumn, bool] | None = None
     for column, values in numbers.items():
-        score, unit = _score(column, values, units.get(column), vocabulary)
+        score, unit, doubt = _score(column, values, units.get(column), vocabulary)
         if score > 0 and (best is None or score > best[0]):
             size = float(np.nanmax(np.abs(values), initial=0.0)) * factor_to(unit, "s")
-            best = score, column, unit, size > SINCE_1970 and bool(np.isfinite(values).all())
+            own = TimeColumn(column, unit, doubt)
+            best = score, own, size > SINCE_1970 and bool(np.isfinite(values).all())
     # A date says when it was; a number that counts from 1970 does too.
-    if best is not None and (not dates or (best[1] == TIME and best[0] > 5) or best[3]):
-        return best[1], best[2]
-    return (dates[0], "s") if dates else None
+    if best is not None and (not dates or (best[1].name == TIME and best[0] > 5) or best[2]):
+        return best[1]
+    return TimeColumn(dates[0], "s") if dates else None
 
 
-def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabulary) -> tuple[float, str]:
+def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabulary) -> tuple[float, str, str]:
     name = vocabulary.read(column)
     words = set(name.words)
     known = values[np.isfinite(values)]
     if column == TIME:
-        own = clock_unit(float(np.max(np.abs(known), initial=0.0))) or "s"
-        own = stated if stated is not None and kind_of(stated) == "time" else own
-        return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, own
+        own = stated if stated is not None and kind_of(stated) == "time" else None
+        own, doubt = _unit(known, own)
+        return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, own, doubt
     unit = next(
         (u for u in (stated, name.unit, _unit_word(name.words, vocabulary)) if u and kind_of(u) == "time"),
         None,
@@ -57,18 +69,16 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         or name.has("statistic", "command", "distance", "speed")
         or len(known) < 2
     ):
-        return 0.0, "s"
+        return 0.0, "s", ""
     if stated is not None and kind_of(stated) != "time":
-        return 0.0, "s"
+        return 0.0, "s", ""
     forward, level = _forward(known), float(np.mean(np.diff(known) >= 0))
     if forward < 0.5 and (level < 0.95 or known[-1] <= known[0]):
-        return 0.0, "s"
-    size = float(np.max(np.abs(known)))
-    since = clock_unit(size)
-    unit = unit or since or "s"
-    step = float(np.median(np.diff(known)[np.diff(known) > 0])) * factor_to(unit, "s")
-    if not _PLAUSIBLE[0] <= step <= _PLAUSIBLE[1]:
-        return 0.0, "s"
+        return 0.0, "s", ""
+    since = clock_unit(float(np.max(np.abs(known))))
+    unit, doubt = _unit(known, unit)
+    if not _PLAUSIBLE[0] <= _step(known) * factor_to(unit, "s") <= _PLAUSIBLE[1]:
+        return 0.0, "s", ""
     score = 2.0 + 2.0 * (forward > 0.9) + 1.0 * (level > 0.95)
     score += (
         0.5 * (since == unit) + 0.3 * bool(words & {"epoch", "unix", "utc"}) + 0.4 * bool(words & {"header"})
@@ -76,7 +86,25 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
     score += 0.2 * (name.unit is not None or stated is not None or bool(since)) - (
         1.0 - len(known) / max(len(values), 1)
     )
-    return score - 2.0 * name.has("other"), unit
+    return score - 2.0 * name.has("other"), unit, doubt
+
+
+def _unit(known: Floats, stated: str | None) -> tuple[str, str]:
+    """The unit of stamps: as ``stated``, or as a clock since 1970 has it, or by their spacing, which is a doubt unless it is seconds."""
+    unit = stated or clock_unit(float(np.max(np.abs(known), initial=0.0)))
+    if unit is not None:
+        return unit, ""
+    step = _step(known)
+    unit = next((u for u in _FINER if step * factor_to(u, "s") < _FIELD_RATE), "s")
+    if unit == "s":
+        return unit, ""
+    return unit, f"no unit is stated, and in s its samples would be {step:.6g} s apart: {unit}?"
+
+
+def _step(known: Floats) -> float:
+    """The usual spacing of stamps that run forward; 0 where none do."""
+    steps = np.diff(known)
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
 def _unit_word(words: tuple[str, ...], vocabulary: Vocabulary) -> str | None:

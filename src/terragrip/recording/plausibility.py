@@ -50,6 +50,7 @@ _RATIOS = (
     (1e-3, "ground_speed may be in mm/s"),
     (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
 )
+_SLIP = 0.08  # of the rims: how far it may move a ratio from that of its reason
 _FINEST = 0.05  # s: no check has a finer resolution
 _ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
@@ -157,10 +158,10 @@ def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         if not shared:
             reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
             reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
-        # Where two reasons fit, the nearer one is reported.
-        distance, why = min((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
-        if distance > np.log(1.35):
-            why = "check units, gear ratio and radius"
+        # The nearest reason is reported, and with it those that the slip, which is unknown, leaves as likely.
+        near = sorted((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
+        likely = [text for distance, text in near if distance < near[0][0] + _SLIP]
+        why = ", or ".join(likely) if near[0][0] <= np.log(1.35) else "check units, gear ratio and radius"
         result.setdefault(why, []).append((wheel, ratio))
     mean = {
         name: float(np.exp(np.mean([np.log(usual[w]) for w in axle.wheels])))  # of both sides: turns cancel

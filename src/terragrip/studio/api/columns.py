@@ -58,6 +58,7 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     from terragrip.formats import Profile
     from terragrip.formats.proposal import profile_text
     from terragrip.formats.recognition import Proposal
+    from terragrip.formats.time_column import TimeColumn
 
     log = studio.folder.file(wanted.log)
     target = studio.folder.new_file(wanted.output, (".yaml", ".yml"))
@@ -66,7 +67,7 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     chosen = Profile.from_dict({"time": wanted.time, "channels": wanted.channels}, wanted.output)
     text = profile_text(
         Path(wanted.log).name,
-        (chosen.time.column, chosen.time.unit),
+        TimeColumn(chosen.time.column, chosen.time.unit),
         {name: Proposal(entry) for name, entry in wanted.channels.items()},
         since_1970=chosen.time.zero is not None,
         head=HEAD,
