@@ -113,6 +113,17 @@ def test_stamps_of_a_processor_are_in_the_unit_that_a_drive_allows(
     assert any("no unit is stated" in warning for warning in inspection.warnings)
 
 
+def test_a_second_clock_beside_the_first_is_named(tmp_path: Path, log: pd.DataFrame) -> None:
+    """Groups of channels written side by side, each with its own time: the slower group's columns end early."""
+    slow = log[["time", "ground_speed"]].iloc[::5].reset_index(drop=True)
+    beside = pd.concat([log.drop(columns="ground_speed"), slow.add_prefix("gps/")], axis=1)
+    beside.to_csv(tmp_path / "log.csv", index=False)
+    assert [w for w in inspect(tmp_path / "log.csv").warnings if w.startswith("gps/time is another clock")]
+    same = log.assign(**{"gps/time": log["time"] + 5, "note_time": np.nan})
+    same.to_csv(tmp_path / "same.csv", index=False)
+    assert not [w for w in inspect(tmp_path / "same.csv").warnings if "another clock" in w]
+
+
 def test_time_has_no_noise(tmp_path: Path, log: pd.DataFrame) -> None:
     path = tmp_path / "log.csv"
     log.to_csv(path, index=False)

@@ -58,6 +58,18 @@ def test_a_ratio_of_wheel_to_ground_speed_names_the_unit_at_any_usual_slip(
     assert f"is {ratio / (1 - slip):.3g} times the ground speed" in note
 
 
+@pytest.mark.parametrize("step", [0.1, 1.0, 5.0])
+def test_a_time_of_day_written_as_hhmmss_is_named(vehicle: Vehicle, step: float) -> None:
+    """As receivers write it: 10:59:59 is 105959, and 11:00:00 is 110000. Seconds of the day are left alone."""
+    of_day = 10 * 3600 + 57 * 60 + step * np.arange(int(240 / step))
+    minute = of_day // 60
+    written = minute // 60 * 10000 + minute % 60 * 100 + of_day % 60
+    speed = 1 + 0.2 * np.sin(of_day)
+    channels = {"ground_speed": speed} | {f"wheel_speed_{w}": speed / RADIUS for w in vehicle.wheels}
+    assert "written as hhmmss" in said(vehicle, time=written, **channels)
+    assert "written as hhmmss" not in said(vehicle, time=of_day, **channels)
+
+
 def test_where_two_units_give_one_ratio_both_are_named(vehicle: Vehicle) -> None:
     """Rims of .165 m in m/s turn as many times too slowly as rims in revolutions per second: the slip decides between them."""
     wheel = {"radius": 0.165, "inertia": 0.27}

@@ -20,7 +20,7 @@ from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import days_in, notes_on, numbers_of
 from terragrip.formats.table import LogTable, Sparse
-from terragrip.formats.time_column import TimeColumn, find_time
+from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.columns import SINCE_1970
@@ -147,8 +147,9 @@ def inspect(
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
     warnings += days_in(seen.floats(), GENERAL)
-    if seen.stamp is not None and seen.stamp.doubt:
-        warnings.append(f"{seen.stamp.name}: {seen.stamp.doubt}")
+    if seen.stamp is not None:
+        warnings += [f"{seen.stamp.name}: {seen.stamp.doubt}"] * bool(seen.stamp.doubt)
+        warnings += other_clocks(numbers, seen.stamp.name, seen.units)
     warnings += [*proposals.left_out, *quiet, *(note for note in seen.repeats.notes() if recording is None)]
     stamp, base = seen.stamp, seen.base
     present = proposals.keys() | fits.channels

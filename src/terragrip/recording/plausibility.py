@@ -351,12 +351,28 @@ def _time_warnings(recording: Recording) -> list[str]:
         return []
     step = np.diff(recording.time)
     spacing = median(step[:: max(1, len(step) // _ENOUGH)])
+    if _is_written_as_hhmmss(recording.time, spacing):
+        return [
+            "time is a time of day written as hhmmss: 59 is followed by 100. Write it as 10:00:00.5, or as seconds; "
+            "every time, distance and gap is wrong now."
+        ]
     mean = float(recording.time[-1] - recording.time[0]) / len(
         step
     )  # instants of two clocks may be close by chance
     if spacing < _SPARSE and mean > _DENSE:
         return []
     return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]
+
+
+def _is_written_as_hhmmss(time: Floats, spacing: float) -> bool:
+    """Whether the last two digits before the point never reach 60, but go on from 59 to the next hundred."""
+    if not (time[0] >= 0 and time[-1] < 240000):
+        return False
+    digits, hundreds = time % 100, time // 100
+    change = np.flatnonzero(np.diff(hundreds))
+    near = max(3 * spacing, 1.0)
+    goes_on = (digits[change] >= 60 - near) & (digits[change + 1] < near)
+    return len(change) > 0 and bool((digits < 60).all() and (hundreds % 100 < 60).all() and goes_on.all())
 
 
 def _typical_size(recording: Recording, name: str) -> float | None:
