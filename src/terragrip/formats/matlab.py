@@ -6,26 +6,26 @@ timeseries, Simulink's Dataset, datetime) of both; what cannot be read is named 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
-from functools import partial
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
-from terragrip.formats.matlab_records import IN_RECORDS
+from terragrip.formats.matlab_objects import TICKS, plain
+from terragrip.formats.matlab_records import IN_RECORDS, STREAM, resolved
 from terragrip.formats.matlab_signals import Contents, seconds_of, walk
 from terragrip.formats.matlab_values import Array, Opaque
 from terragrip.formats.registry import Databases, Format
-from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import LogTable, Wanted, kept_rows
-from terragrip.formats.worker import Worker
+from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
+from terragrip.formats.table import LogTable, Wanted
+from terragrip.formats.worker import Reading, UnreadableError, Worker
 
 if TYPE_CHECKING:
     from terragrip.formats.table_on_disk import TableOnDisk
@@ -37,35 +37,49 @@ _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     if not is_hdf5(path):
-        with _worker(path) as worker:
-            worker.send(None)
-            read = worker.receive()["tree"]
-            return _finished({name: _of_worker(part, worker) for name, part in read.items()}, path, wanted)
+        return _by_matio(path, wanted)
     h5py = needed("h5py", "a MATLAB 7.3 file")
     with reading(path, "MATLAB file", RuntimeError), h5py.File(path, "r") as file:
-        return _with_objects(tree_of(file, h5py), path, wanted)
+        tree = tree_of(file, h5py)
+        if any(map(_holds_object, tree.values())):
+            try:
+                return _by_matio(path, wanted)
+            except UnreadableError:
+                pass  # the notes name what is left
+        contents = _contents(tree, path, wanted is None)
+        outline = _outline(contents)
+        return _log(outline, _samples(contents, _chosen(outline, wanted)), path, wanted)
 
 
-def _with_objects(tree: dict[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
-    """The wanted signals of a file's variables; objects of MATLAB classes are read by mat-io, in a process of its own."""
-    names = [name for name, value in tree.items() if _holds_object(value)]
-    if not names:
-        return _finished(tree, path, wanted)
-    with ExitStack() as kept:  # the process lives until its arrays were read
-        try:
-            worker = kept.enter_context(_worker(path))
-            worker.send(names)
-            read = worker.receive()["tree"]
-        except InputError:
-            return _finished(tree, path, wanted)  # the notes name what is left
-        known = {
-            name: value for name, part in read.items() if (value := _of_worker(part, worker)) is not None
-        }
-        return _finished({**tree, **known}, path, wanted)
+def _chosen(outline: _Outline, wanted: Wanted | None) -> list[str]:
+    return [name for name in outline.names if wanted is None or wanted(name)]
 
 
-def _worker(path: str) -> Worker:
-    return Worker("terragrip.formats.matlab_worker", "matio", path, "MATLAB file")
+def _by_matio(path: str, wanted: Wanted | None) -> SignalLog | LogTable:
+    with Worker("terragrip.formats.matlab:items_of", "matio", path, "MATLAB file", wanted is None) as worker:
+        outline = worker.receive()
+        worker.send(_chosen(outline, wanted))
+        return _log(outline, worker, path, wanted)
+
+
+def items_of(path: str, first_run: bool) -> Reading:
+    """The outline of a file, then clocks and samples of the signals that are wanted; objects of MATLAB classes are read."""
+    matio = needed("matio", "an object of MATLAB")
+    tree: dict[str, Any] = {}
+    names = records = None
+    with ExitStack() as kept:  # the file is open until its arrays were read
+        if is_hdf5(path):
+            h5py = needed("h5py", "a MATLAB 7.3 file")
+            file = kept.enter_context(h5py.File(path, "r"))
+            tree, records = tree_of(file, h5py), file.get(STREAM)
+            names = [name for name, value in tree.items() if _holds_object(value)]
+        loaded = matio.load_from_mat(path, variable_names=names)
+        for name in names or [name for name in loaded if not name.startswith("__")]:
+            if name in loaded and (value := resolved(plain(loaded.pop(name)), records, TICKS)) is not None:
+                tree[name] = value
+        contents = _contents(tree, path, first_run)
+        chosen = yield _outline(contents)
+        yield from _samples(contents, chosen)
 
 
 def _holds_object(value: Any) -> bool:
@@ -75,60 +89,70 @@ def _holds_object(value: Any) -> bool:
     return any(_holds_object(part) for part in parts)
 
 
-def _of_worker(node: Any, worker: Worker) -> Any:
-    """What the worker said of a value, its arrays read when they are asked for."""
-    if not isinstance(node, dict):
-        return None
-    if "struct" in node:
-        return {key: _of_worker(part, worker) for key, part in node["struct"].items()}
-    if "list" in node:
-        return [_of_worker(part, worker) for part in node["list"]]
-    if "array" in node:
-        return Array(tuple(node["shape"]), partial(_asked, worker, node["array"]))
-    return Opaque(node["object"]) if "object" in node else node["text"]
+@dataclass(frozen=True)
+class _Outline:
+    """What a file holds: the names of all signals or, where none has a clock, of the columns of a table; sentences for the user."""
+
+    names: tuple[str, ...]
+    notes: tuple[str, ...]
+    is_table: bool
 
 
-def _asked(worker: Worker, number: int) -> npt.NDArray[Any]:
-    worker.send(number)
-    return worker.array()
+def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
+    """The signals, or the columns without a clock, in a file's variables; ``first_run``: of an array of drives only those of the first.
 
-
-def _finished(tree: Mapping[str, Any], path: str, wanted: Wanted | None) -> SignalLog | LogTable:
-    """The wanted signals of what a file holds."""
+    Raises InputError where there are none.
+    """
     contents = Contents()
     walk(tree, "", contents, 0)
-    if wanted is None:  # nobody has named a run: signals of two must not be mixed
+    if first_run:  # nobody has named a run: signals of two must not be mixed
         later = tuple(f"{name}[{k}]." for name, count in contents.runs.items() for k in range(1, count))
         contents.signals = {n: one for n, one in contents.signals.items() if not n.startswith(later)}
-    notes = [*_notes(contents), *contents.notes]
     if not contents.signals and not contents.loose:
+        notes = _notes(contents)
         problem = "; ".join(["has no numeric column", *(note.rstrip(".") for note in notes[:1])])
         if contents.odd:
             problem = notes[0].rstrip(".")
         raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
     if not contents.signals:
-        return _table_of(contents.loose, path, wanted, notes)
-    clocks: dict[int, Floats] = {}
-    arrays: dict[int, npt.NDArray[Any]] = {}
-    signals = {}
-    for name, (clock, values, column) in contents.signals.items():
-        if wanted is not None and not wanted(name):
+        contents.loose = _of_one_length(contents.loose)
+    return contents
+
+
+def _outline(contents: Contents) -> _Outline:
+    notes = (*_notes(contents), *contents.notes)
+    return _Outline(tuple(contents.signals or contents.loose), notes, not contents.signals)
+
+
+def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samples]:
+    """Of these signals each with the clock before it that it needs, of the columns of a table none."""
+    clocks: set[int] = set()
+    matrix, whole = None, np.empty(0)
+    for name in chosen:
+        if not contents.signals:
+            yield Samples(name, None, _read(contents.loose[name]).ravel().astype(np.float64))
             continue
+        clock, values, column = contents.signals[name]
         length = int(np.prod(clock.shape))
-        rows = kept_rows(length, wanted)
         if id(clock) not in clocks:
-            whole = seconds_of(_read(clock).ravel(), contents.scales.get(id(clock), 1.0))
-            clocks[id(clock)] = whole[rows]
+            clocks.add(id(clock))
+            yield Clock(id(clock), seconds_of(_read(clock).ravel(), contents.scales.get(id(clock), 1.0)))
         if isinstance(values, Array) and values.part is not None:
             flat = values.column(column or 0, length)
         else:
-            if id(values) not in arrays:
-                arrays = {id(values): _read(values)}  # columns of one matrix stand side by side
-            flat = arrays[id(values)].reshape(length, -1)[:, column or 0]
-        signals[name] = Signal(
-            clocks[id(clock)], np.asarray(flat[rows], dtype=np.float64), contents.units.get(name)
-        )
-    return SignalLog(tuple(contents.signals), signals, path, sha256(path), tuple(notes))
+            if matrix is not values:
+                matrix, whole = values, _read(values)  # columns of one matrix stand side by side
+            flat = whole.reshape(length, -1)[:, column or 0]
+        yield Samples(name, id(clock), np.asarray(flat, dtype=np.float64), contents.units.get(name))
+
+
+def _log(
+    outline: _Outline, items: Iterable[Clock | Samples], path: str, wanted: Wanted | None
+) -> SignalLog | LogTable:
+    if not outline.is_table:
+        return SignalLog(outline.names, signals_of(items, wanted), path, sha256(path), outline.notes)
+    columns = {one.name: one.values for one in items if isinstance(one, Samples)}
+    return LogTable(outline.names, columns, {}, path, sha256(path), outline.notes)
 
 
 def _notes(contents: Contents) -> list[str]:
@@ -166,17 +190,11 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
-def _table_of(loose: Mapping[str, Any], path: str, wanted: Wanted | None, notes: list[str]) -> LogTable:
-    """Columns of one length without a clock, as a plain table."""
+def _of_one_length(loose: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns that have the length that most have."""
     lengths = [int(np.prod(value.shape)) for value in loose.values()]
     length = max(set(lengths), key=lambda n: (lengths.count(n), n))
-    names = [name for name, n in zip(loose, lengths, strict=True) if n == length]
-    columns = {
-        name: _read(loose[name]).ravel().astype(np.float64)
-        for name in names
-        if wanted is None or wanted(name)
-    }
-    return LogTable(tuple(names), columns, {}, path, sha256(path), tuple(notes))
+    return {name: value for (name, value), n in zip(loose.items(), lengths, strict=True) if n == length}
 
 
 def _read(value: Any) -> npt.NDArray[Any]:

@@ -8,17 +8,17 @@ rests on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.boundary import DAMAGE
 from terragrip.formats.matlab_values import Array, Opaque
 
-_STREAM = "#sigstream#"
+STREAM = "#sigstream#"
+"""The group of a file that holds its records."""
 _CLASSES = {"double": "f8", "single": "f4", "half": "f2", "logical": "u1", "boolean": "u1", "int8": "i1", "uint8": "u1",
             "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8"}  # fmt: skip
 _OF_SIZE = {1: "1", 2: "2", 4: "4", 8: "8"}
@@ -28,17 +28,6 @@ _DAYS_TO_1970, _DAY = 719_529.0, 86_400.0
 
 IN_RECORDS = "Dataset saved with -v7.3"
 """Stands for a series whose samples are in records that are not there, or cannot be read."""
-
-
-@contextmanager
-def records_of(path: str) -> Iterator[Any]:
-    """The records of a file, or None where it has none."""
-    h5py = needed("h5py", "a MATLAB 7.3 file")
-    if not h5py.is_hdf5(path):
-        yield None
-        return
-    with h5py.File(path, "r") as file:
-        yield file.get(_STREAM)
 
 
 def resolved(value: Any, records: Any, ticks: Mapping[str, float]) -> Any:

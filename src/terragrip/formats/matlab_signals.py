@@ -176,7 +176,7 @@ def _is_list(value: Any) -> bool:
 
 def _is_numeric(value: Any) -> bool:
     return isinstance(value, Array) or (
-        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim > 0
+        isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim > 0 and value.size > 0
     )
 
 

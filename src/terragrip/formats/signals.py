@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats, Ints
 from terragrip.errors import InputError
-from terragrip.formats.table import LogTable
+from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 
@@ -28,6 +29,37 @@ class Signal:
     time: Floats
     values: npt.NDArray[Any]
     unit: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """The instants (n,) [s] of the `Samples` that name it by its ``key``."""
+
+    key: Any
+    time: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The values (n,) of a signal, at the instants of the clock that has its key."""
+
+    name: str
+    clock: Any
+    values: npt.NDArray[Any]
+    unit: str | None = None
+
+
+def signals_of(items: Iterable[Clock | Samples], wanted: Wanted | None) -> dict[str, Signal]:
+    """Signals by name from clocks and samples, each behind its clock: of a log that is looked at in parts, some of their rows."""
+    clocks: dict[Any, Floats] = {}
+    result = {}
+    for item in items:
+        if isinstance(item, Clock):
+            clocks[item.key] = item.time[kept_rows(len(item.time), wanted)]
+        else:
+            values = item.values[kept_rows(len(item.values), wanted)]
+            result[item.name] = Signal(clocks[item.clock], values, item.unit)
+    return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,118 +1,118 @@
 """A process of its own for a library whose C code a damaged file can crash, or send out of bounds.
 
-The worker is a module that calls `serve`; who wants a file's content runs it by `Worker`. Standard output carries JSON lines and NumPy
-arrays, standard input JSON lines: a path, then what the two sides agree on. Memory and processor time are bounded for each file.
-A process that has ended a file waits for the next one, since importing the library takes longer than a small file.
+What reads a file there is a generator: it yields what the file offers, is sent what is wanted of it, and yields that. `Worker` runs it; the
+two sides exchange pickles. Memory and processor time are bounded for each file. A process that has ended a file waits for the next one,
+since importing the library takes longer than a small file.
 """
 
 from __future__ import annotations
 
 import atexit
-import contextlib
-import json
 import os
+import pickle
 import resource
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
+from importlib import import_module
 from importlib.util import find_spec
-from typing import Any, BinaryIO, Self
-
-import numpy as np
-import numpy.typing as npt
+from typing import Any, Self
 
 from terragrip.errors import InputError
 from terragrip.formats.boundary import needed
 
 _MEMORY = 3 << 30  # bytes of address space beyond what the imports and the file take
 _SECONDS, _BYTES_A_SECOND = 10, 1 << 20  # of the processor: so many, and one more for so many bytes
-_ENDED = "it ends the reader"
 
+Reading = Generator[Any, Any, None]
 
 _idle: dict[tuple[str, int], list[subprocess.Popen[bytes]]] = {}
-"""Processes that wait for a file, by module and by the process that started them: a forked child must not share its parent's."""
+"""Processes that wait for a file, by reader and by the process that started them: a forked child must not share its parent's."""
+
+
+class UnreadableError(InputError):
+    """The library failed on a file, or ended the process."""
+
+
+@dataclass(frozen=True)
+class _End:
+    """Follows the last item of a file; ``failure``: what went wrong."""
+
+    failure: InputError | str | None
 
 
 class Worker:
-    """The process that reads a file, and what it says. Raises InputError where the reader fails or ends.
+    """The process that reads a file, and its items. Raises UnreadableError where the reader fails or ends, and the InputErrors of its own.
 
-    ``module`` serves, with the library ``package``; ``kind`` is the file's, for messages.
+    ``reader``: module and function, of the path and the ``arguments``, with the library ``package``; ``kind`` is the file's, for messages.
     """
 
-    def __init__(self, module: str, package: str, path: str, kind: str) -> None:
-        self._module, self._path, self._kind = module, path, kind
-        self._has_ended = self._is_lost = False
+    def __init__(self, reader: str, package: str, path: str, kind: str, *arguments: Any) -> None:
+        self._reader, self._package = reader, package
+        self._path, self._kind, self._arguments = path, kind, arguments
+        self._has_ended = False
         if find_spec(package) is None:
             needed(package, f"a {kind}")  # says what to install
 
     def __enter__(self) -> Self:
-        waiting = [p for p in _idle.pop((self._module, os.getpid()), []) if p.poll() is None]
-        self._process = waiting.pop() if waiting else _started(self._module)
-        _idle[self._module, os.getpid()] = waiting
-        self.send(self._path)
+        waiting = [p for p in _idle.pop((self._reader, os.getpid()), []) if p.poll() is None]
+        self._process = waiting.pop() if waiting else _started(self._reader, self._package)
+        _idle[self._reader, os.getpid()] = waiting
+        self.send((self._path, *self._arguments))
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *failure: object) -> None:
-        if self._is_lost or (kind is not None and not issubclass(kind, Exception)):
-            self._kill()
-            return
-        try:
-            if not self._has_ended:
-                self.send(None)  # nothing more is asked for
-            while not self._has_ended:
-                self.receive()
-        except (InputError, ValueError):  # it was still sending, or is gone
-            self._kill()
-            return
-        _idle.setdefault((self._module, os.getpid()), []).append(self._process)
-
-    def _kill(self) -> None:
-        self._process.kill()
-        self._process.communicate()
+    def __exit__(self, *failure: object) -> None:
+        if self._has_ended:
+            _idle.setdefault((self._reader, os.getpid()), []).append(self._process)
+        else:
+            self._process.kill()
+            self._process.communicate()
 
     def send(self, message: Any) -> None:
-        """Send the worker something."""
+        """Send the reader something."""
         assert self._process.stdin is not None
         try:
-            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            pickle.dump(message, self._process.stdin)
             self._process.stdin.flush()
         except OSError as error:
-            raise self._damaged(_ENDED) from error
+            raise self._unreadable("it ends the reader") from error
 
-    def receive(self) -> dict[str, Any]:
-        """The next message."""
+    def receive(self) -> Any:
+        """The next item; None behind the last."""
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line.endswith(b"\n"):
-            raise self._damaged(_ENDED)
-        message: dict[str, Any] = json.loads(line)
-        self._has_ended = "end" in message or "error" in message
-        if "error" in message:
-            raise self._damaged(str(message["error"]))
-        return message
-
-    def array(self) -> npt.NDArray[Any]:
-        """The next array."""
         try:
-            return np.lib.format.read_array(self, allow_pickle=False)  # type: ignore[arg-type]  # it reads as a file does
-        except ValueError as error:
-            raise self._damaged(_ENDED) from error
+            item = pickle.load(self._process.stdout)
+        except (EOFError, pickle.UnpicklingError) as error:
+            raise self._unreadable("it ends the reader") from error
+        if not isinstance(item, _End):
+            return item
+        self._has_ended = True
+        if isinstance(item.failure, InputError):
+            raise item.failure
+        if item.failure is not None:
+            raise self._unreadable(item.failure)
+        return None
 
-    def read(self, size: int) -> bytes:
-        """Bytes of an array, for NumPy."""
-        assert self._process.stdout is not None
-        return self._process.stdout.read(size)
+    def __iter__(self) -> Iterator[Any]:
+        while (item := self.receive()) is not None:
+            yield item
 
-    def _damaged(self, why: str) -> InputError:
-        self._is_lost = self._is_lost or why == _ENDED
+    def _unreadable(self, why: str) -> InputError:
         sentence = " ".join(why.split())[:100]
         hint = "copy or record it again"
-        return InputError(f"is a damaged {self._kind}, or none ({sentence})", file=self._path, hint=hint)
+        return UnreadableError(f"is a damaged {self._kind}, or none ({sentence})", file=self._path, hint=hint)
 
 
-def _started(module: str) -> subprocess.Popen[bytes]:
+def _started(reader: str, package: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-W", "ignore", "-m", module],
+        [
+            sys.executable,
+            "-W",
+            "ignore",
+            "-c",
+            f"from {__name__} import serve; serve({reader!r}, {package!r})",
+        ],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -127,43 +127,39 @@ def _end_all() -> None:
             process.communicate()
 
 
-class Outlet:
-    """The messages of a worker to the process that runs it."""
-
-    def __init__(self, out: BinaryIO) -> None:
-        self._out = out
-        self.write = out.write  # for NumPy, which takes this for no file and so keeps the order of bytes
-
-    def send(self, message: dict[str, Any]) -> None:
-        """Send a message."""
-        self._out.write(json.dumps(message).encode() + b"\n")
-        self._out.flush()
-
-    def send_array(self, array: npt.NDArray[Any]) -> None:
-        """Send an array."""
-        np.lib.format.write_array(self, np.ascontiguousarray(array), allow_pickle=False)
-        self._out.flush()
-
-    def receive(self) -> Any:
-        """The next message of the other side."""
-        return json.loads(sys.stdin.readline())
-
-
-def serve(package: str, work: Callable[[str, Outlet], None]) -> int:
-    """Do ``work`` on the files that standard input names; anything that goes wrong becomes a message with the reason."""
-    out = Outlet(os.fdopen(os.dup(sys.stdout.fileno()), "wb"))
+def serve(reader: str, package: str) -> None:
+    """Read the files that standard input names, until it is closed; what goes wrong with one is its last item."""
+    out = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what libraries print is none of it
-    while line := sys.stdin.readline():
+    module, _, function = reader.partition(":")
+    read: Callable[..., Reading] = getattr(import_module(module), function)
+
+    def send(item: Any) -> None:
+        pickle.dump(item, out, protocol=5)
+        out.flush()
+
+    while True:
         try:
-            __import__(package)
-            path = json.loads(line)
+            path, *arguments = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        failure: InputError | str | None = None
+        try:
+            import_module(package)  # before its memory counts
             _limit(path)
-            work(path, out)
-            out.send({"end": True})
+            items = read(path, *arguments)
+            send(next(items))
+            item = items.send(pickle.load(sys.stdin.buffer))
+            while True:
+                send(item)
+                item = next(items)
+        except StopIteration:
+            pass
+        except InputError as error:
+            failure = error
         except Exception as error:  # noqa: BLE001 - whatever a damaged file brings is reported to the caller
-            with contextlib.suppress(OSError):
-                out.send({"error": f"{type(error).__name__}: {error}"[:200]})
-    return 0
+            failure = f"{type(error).__name__}: {error}"[:200]
+        send(_End(failure))
 
 
 def _limit(path: str) -> None:
