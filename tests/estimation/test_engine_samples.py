@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import pytest
 
 import terragrip as tg
 from terragrip.errors import InputError
-from terragrip.estimation.engine_estimator import _ROOM, EngineEstimator, _Tail, live_estimator, restored
+from terragrip.estimation.engine_estimator import _MAGIC, EngineEstimator, live_estimator, restored
 from terragrip.estimation.engine_torque import TAIL
 from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.sealed import seal, unseal
 
 NOISE = {
     "ground_speed": 0.02,
@@ -122,37 +124,23 @@ def test_other_machines_get_the_plain_estimator() -> None:
     )
 
 
-@pytest.mark.parametrize("rows", [5, _ROOM + 7, 3 * _ROOM])
-def test_a_tail_holds_the_seconds_that_a_rows_torque_depends_on(rows: int) -> None:
-    step = 1 / 128
-    tail = _Tail(("a", "b"))
-    assert tail.last == -np.inf
-    for k in range(rows):
-        tail.add(step * k, [float(k), -float(k)])
-    kept = min(rows, round(TAIL / step) + 1)
-    np.testing.assert_allclose(tail.time, step * np.arange(rows - kept, rows))
-    np.testing.assert_array_equal(tail["a"], np.arange(rows - kept, rows))
-    np.testing.assert_array_equal(tail["b"], -np.arange(rows - kept, rows))
-    assert tail.last == step * (rows - 1)
-    again = _Tail(("a", "b"))
-    again.restore(tail.state())
-    again.add(step * rows, [1.0, 2.0])
-    tail.add(step * rows, [1.0, 2.0])
-    np.testing.assert_array_equal(again.time, tail.time)
-    np.testing.assert_array_equal(again["b"], tail["b"])
-    with pytest.raises(InputError):
-        _Tail(("a",)).restore(state_of(5))
+def test_a_snapshot_holds_the_seconds_that_a_rows_torque_depends_on() -> None:
+    log, sizes = work(), {}
+    made = live_estimator(tractor(), "kalman", tuple(log.channels), sensors=NOISE, held={})
+    for turn in range(3):
+        for time, sample in rows_of(log):
+            made.update({**sample, "time": time + 12.0 * turn})
+        sizes[turn] = len(made.snapshot())
+    assert TAIL < 12.0
+    assert sizes[2] == pytest.approx(sizes[0], rel=0.01)
 
 
-def state_of(rows: int) -> str:
-    tail = _Tail(("a", "b"))
-    for k in range(rows):
-        tail.add(float(k), [0.0, 0.0])
-    return tail.state()
-
-
-def test_many_rows_within_the_tail_find_room() -> None:
-    tail = _Tail(("a",))
-    for k in range(3000):
-        tail.add(1e-3 * k, [float(k)])
-    np.testing.assert_array_equal(tail["a"], np.arange(3000))
+def test_a_snapshot_with_another_number_of_channels_is_refused() -> None:
+    log = work()
+    made = live_estimator(tractor(), "kalman", tuple(log.channels), sensors=NOISE, held={})
+    for time, sample in rows_of(log)[:5]:
+        made.update({**sample, "time": time})
+    about = json.loads(unseal(_MAGIC, made.snapshot()))
+    about["given"] = [*about["given"], "pitch"]
+    with pytest.raises(InputError, match="snapshot is damaged"):
+        restored(seal(_MAGIC, json.dumps(about).encode()))

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 
 _MAGIC = b"TGRIPEN1"
-_ROOM = 1024  # rows that the tail has room for at first
 _NEEDED = (
     "adhesion_driven", "soil_resistance", "net_traction_driven", "efficiency_driven", "slip_driven", "curve_a", "curve_a_driven",
 )  # fmt: skip
@@ -63,7 +62,7 @@ class EngineEstimator(TractionEstimator):
         self.fixed = fixed
         self.given = tuple(channels)
         self.converted: dict[str, float] = {}
-        self._tail = _Tail(self.given)
+        self._recent = np.empty((1 + len(self.given), 0))  # times [s] of the last rows, and what they gave
         self._places = {name: place for name, place in super().places.items() if machine.shows(name)}
 
     @property
@@ -84,15 +83,18 @@ class EngineEstimator(TractionEstimator):
     def update_at(self, time: float, sample: Mapping[str, float | None]) -> Estimate:
         """As of any machine; the sample has the bus's channels. ``converted`` then holds those of the machine of driven wheels."""
         row = [_number(sample.get(name)) for name in self.given]
-        if not (math.isfinite(time) and time > self._tail.last) or any(map(math.isinf, row)):
+        recent = self._recent
+        if not (math.isfinite(time) and (time > recent[0, -1:]).all()) or any(map(math.isinf, row)):
             if any(map(math.isinf, row)):
                 raise unusable({**sample, "time": time}, self.given)
             return super().update_at(time, {})  # which reports what is wrong with the time
         if not self.fixed:
             self._learn_engine(sample)
-        self._tail.add(time, row)
-        channels = {name: self._tail[name] for name in self.machine.channels if name in self.given}
-        values, drive = self.machine.converted(self._tail.time, channels, len(self._tail.time) - 1)
+        first = int(np.searchsorted(recent[0], time - TAIL))
+        self._recent = recent = np.column_stack([recent[:, first:], [time, *row]])
+        given = dict(zip(self.given, recent[1:], strict=True))
+        channels = {name: given[name] for name in self.machine.channels if name in given}
+        values, drive = self.machine.converted(recent[0], channels, recent.shape[1] - 1)
         self.converted = {name: float(value[0]) for name, value in values.items() if value[0] == value[0]}
         return self._completed(super().update_at(time, self.converted), drive.std)
 
@@ -133,7 +135,7 @@ class EngineEstimator(TractionEstimator):
             "machine": self.machine.to_dict(),
             "given": self.given,
             "fixed": self.fixed,
-            "tail": self._tail.state(),
+            "tail": b64encode(self._recent.tobytes()).decode(),
             "inner": b64encode(super().snapshot()).decode(),
         }
         return seal(_MAGIC, json.dumps(about).encode())
@@ -151,55 +153,11 @@ class EngineEstimator(TractionEstimator):
             machine, about["given"], inner.method, sensors=inner.noise, held=inner.held, fixed=about["fixed"]
         )
         result.guessed, result._engine = inner.guessed, inner._engine
-        result._tail.restore(about["tail"])
-        return result
-
-
-class _Tail:
-    """The last rows of the bus, on which the torque of one depends."""
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._place = {name: 1 + k for k, name in enumerate(names)}
-        self._rows = np.empty((1 + len(names), _ROOM))
-        self._first = self._end = 0
-
-    @property
-    def last(self) -> float:
-        """Time [s] of the last row; -inf before the first."""
-        return float(self._rows[0, self._end - 1]) if self._end > self._first else -math.inf
-
-    @property
-    def time(self) -> Floats:
-        """Times (n,) [s]."""
-        return self._rows[0, self._first : self._end]
-
-    def __getitem__(self, name: str) -> Floats:
-        return self._rows[self._place[name], self._first : self._end]
-
-    def add(self, time: float, values: list[float]) -> None:
-        """Append a row, and drop those that are too old."""
-        if self._end == self._rows.shape[1]:
-            kept = self._rows[:, self._first : self._end]
-            rows = self._rows if 2 * kept.shape[1] <= self._end else np.empty((len(kept), 2 * self._end))
-            rows[:, : kept.shape[1]] = kept.copy()
-            self._rows, self._first, self._end = rows, 0, kept.shape[1]
-        self._rows[:, self._end] = time, *values
-        self._end += 1
-        self._first += int(np.searchsorted(self.time, time - TAIL))
-
-    def state(self) -> str:
-        """To the last bit, as JSON holds it."""
-        return b64encode(np.ascontiguousarray(self._rows[:, self._first : self._end]).tobytes()).decode()
-
-    def restore(self, state: str) -> None:
-        """The rows of `state`, made by one of the same channels; raises InputError where it is none."""
-        rows = np.frombuffer(b64decode(state))
-        if rows.size % len(self._rows):
+        tail = np.frombuffer(b64decode(about["tail"]))
+        if tail.size % len(result._recent):
             raise refusal(6, None)
-        rows = rows.reshape(len(self._rows), -1)
-        self._rows = np.empty((len(rows), max(_ROOM, 2 * rows.shape[1])))
-        self._rows[:, : rows.shape[1]] = rows
-        self._first, self._end = 0, rows.shape[1]
+        result._recent = tail.reshape(len(result._recent), -1)
+        return result
 
 
 def _number(value: Any) -> float:
