@@ -15,9 +15,7 @@ class _ArrowFile:
     """A file that Arrow writes table by table."""
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
-        table = first.to_arrow()
-        self._first: tuple[Estimates, pa.Table] | None = (first, table)
-        self._schema = table.schema
+        self._schema = first.select(slice(0, 0)).to_arrow().schema
         self._writer = self._opened(path, self._schema)
 
     def _opened(self, path: Path, schema: pa.Schema) -> Any:
@@ -25,9 +23,7 @@ class _ArrowFile:
 
     def write(self, part: Estimates) -> None:
         """Write the rows of a part."""
-        begun, self._first = self._first, None
-        table = begun[1] if begun is not None and begun[0] is part else part.to_arrow()
-        self._writer.write_table(table.cast(self._schema))
+        self._writer.write_table(part.to_arrow().cast(self._schema))
 
     def close(self) -> None:
         """Complete the file."""
