@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from array import array
 
 import cantools
 import numpy as np
@@ -71,8 +70,7 @@ def test_what_is_missing_is_not_available(vehicle):
     estimator = TractionEstimator(vehicle)
     values = [float("nan")] * len(estimator.update({"time": 0.0}).values)
     values[estimator.engine.index_out["slip_fl"]] = 40.0
-    packed = array("d", values).tobytes()
-    row = Row(0.0, {}, Estimate(0.0, "gap", packed, estimator.engine.index_out), predicted=True)
+    row = Row(0.0, {}, Estimate(0.0, "gap", values, estimator.engine.index_out), predicted=True)
     frames = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface",)}, "sink"), vehicle).frames(
         row
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import struct
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,8 +15,7 @@ from terragrip.live.message import Columns
 
 def row(values: dict[str, float], time: float = 1.5, predicted: bool = False) -> Row:
     places = {name: place for place, name in enumerate(values)}
-    packed = struct.pack(f"={len(values)}d", *values.values())
-    return Row(1.7e9 + 0.123456, {}, Estimate(time, "outlier", packed, places), predicted)
+    return Row(1.7e9 + 0.123456, {}, Estimate(time, "outlier", list(values.values()), places), predicted)
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=4), st.floats(0, 1e9))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from array import array
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -104,11 +103,9 @@ class Engine:
         for name, slot in self.slots_in.items():
             names[slot] = name
         self._names = tuple(names)
-        real = ffi.sizeof("tg_real")
-        self._doubles = real == ffi.sizeof("double")  # else the kernel in single precision, as tests have it
-        self._pack = struct.Struct(f"=d{lib.TG_SLOTS}{'d' if self._doubles else 'f'}").pack_into
+        single = ffi.sizeof("tg_real") < ffi.sizeof("double")  # the kernel that tests have
+        self._pack = struct.Struct(f"=d{lib.TG_SLOTS}{'f' if single else 'd'}").pack_into
         self._room_in = ffi.buffer(self.sample)
-        self._room_out = ffi.buffer(self.estimate.value, real * self._used)
 
     @property
     def standstill_speed(self) -> float:
@@ -123,11 +120,9 @@ class Engine:
         status: int = lib.tg_estimator_update(self.handle, self.sample, self.estimate)
         return status
 
-    def packed(self) -> bytes:
-        """A copy of the numbers in ``self.estimate``: doubles, a column of `outputs` at each place of ``index_out``."""
-        if not self._doubles:
-            return array("d", ffi.unpack(self.estimate.value, self._used)).tobytes()
-        result: bytes = self._room_out[:]
+    def values(self) -> list[float]:
+        """The numbers in ``self.estimate``, a column of `outputs` at each place of ``index_out``."""
+        result: list[float] = ffi.unpack(self.estimate.value, self._used)
         return result
 
     def run(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import struct
 from base64 import b64decode, b64encode
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -120,8 +119,7 @@ class EngineEstimator(TractionEstimator):
         columns = {name: np.array([values[places[name]]]) for name in names}
         for name, value in self.machine.completed(columns, std).items():
             values[places[name]] = float(value[0])
-        packed = struct.pack(f"={len(values)}d", *values)
-        return Estimate(estimate.time, estimate.event, packed, self._places)
+        return Estimate(estimate.time, estimate.event, values, self._places)
 
     def update_block(self, recording: Recording) -> Estimates:
         """Not available sample by sample: it needs a whole log, see :func:`terragrip.estimate`."""

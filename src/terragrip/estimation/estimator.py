@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self
 
@@ -37,13 +37,12 @@ class Estimate:
     :attr:`TractionEstimator.columns` as plain floats. A value is NaN only where ``event`` gives the reason.
     """
 
-    __slots__ = ("_values", "event", "packed", "places", "time")
+    __slots__ = ("event", "places", "time", "values")
 
-    def __init__(self, time: float, event: str, packed: bytes, places: dict[str, int]) -> None:
+    def __init__(self, time: float, event: str, values: Sequence[float], places: dict[str, int]) -> None:
         self.time = time
         self.event = event
-        self.packed = packed  # doubles: values that are only forwarded need not become floats
-        self._values: tuple[float, ...] | None = None
+        self.values = values
         self.places = places  # index of each column in `values`
 
     def __getitem__(self, name: str) -> Any:
@@ -61,13 +60,6 @@ class Estimate:
 
     def __iter__(self) -> Iterator[str]:
         return iter(("time", *self.places, "event"))
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """All numbers of ``packed``, in the order of `places`."""
-        if self._values is None:
-            self._values = struct.unpack(f"={len(self.packed) // 8}d", self.packed)
-        return self._values
 
     def to_dict(self) -> dict[str, float | str]:
         """All columns by name."""
@@ -257,7 +249,7 @@ class TractionEstimator:
         """The kernel's latest estimate."""
         engine = self._engine
         out = engine.estimate
-        return Estimate(out.time, EVENTS[out.event], engine.packed(), engine.index_out)
+        return Estimate(out.time, EVENTS[out.event], engine.values(), engine.index_out)
 
     def _update_known(self, time: float, sample: Mapping[str, float | None]) -> int:
         """A sample with None values; raises InputError on a value that is not a number."""

@@ -36,7 +36,7 @@ class Segment:
     time: array[float] = field(default_factory=lambda: array("d"))
     arrival: array[float] = field(default_factory=lambda: array("d"))
     codes: bytearray = field(default_factory=bytearray)  # of the rows' events
-    estimates: bytearray = field(default_factory=bytearray)
+    estimates: array[float] = field(default_factory=lambda: array("d"))
     measured: dict[tuple[str, ...], tuple[array[int], array[float]]] = field(default_factory=dict)
     """Of the channels that came together, the places of their rows, and their values one behind the other."""
     refusals: list[Refusal] = field(default_factory=list)
@@ -59,7 +59,7 @@ class Segment:
             self.time.append(estimate.time)
             self.arrival.append(output.arrival)
             self.codes.append(_CODES[estimate.event])
-            self.estimates += estimate.packed
+            self.estimates.extend(estimate.values)
         elif isinstance(output, Event):
             self.events.append(output)
         elif isinstance(output, Ground):
