@@ -150,3 +150,25 @@ def test_memory_is_bounded_and_its_moments_become_rarer(vehicle, monkeypatch):
     ]
     assert moments == [50 * n for n in (1, 2, 3, 4, 5, 7, 9, 13, 17, 25, 33, 49, 65, 97)]
     assert len(str(learner.state())) < 6 * 50 * 2 * 8 * 1.5
+
+
+@pytest.mark.parametrize(
+    ("lost", "words"),
+    [
+        ("drive_torque_rr", "drive_torque_rr never came: without that every row is a gap; name it"),
+        ("drive_torque_", "for slip alone give a profile of the speeds"),
+        ("ground_speed", "ground_speed never came"),
+    ],
+)
+def test_a_channel_that_never_comes_is_named(vehicle, long, lost, words):
+    """Rows go on being estimated, and all of them are gaps: nothing else shows that one name was not that of the vehicle's."""
+    rows = [
+        (t, {n: v for n, v in sample.items() if not n.startswith(lost)})
+        for t, sample in rows_of(long.recording)
+    ]
+    core = Core(vehicle, Settings(("udp://test",)))
+    outputs = [out for time, values in rows[:1100] for out in core.process(time, 0, time, values)]
+    assert [out.text for out in outputs if isinstance(out, Event) and words in out.text]
+    assert {out.estimate.event for out in outputs if isinstance(out, Row) and out.estimate.time > 3} == {
+        "gap"
+    }

@@ -33,13 +33,15 @@ WORTH = 0.1
 class Learned:
     """SDs [SI] by channel and update periods [s], as learned from ``seconds`` of kept rows of the drive so far.
 
-    ``doubts``: sentences on speeds that are likely in another unit, once two evaluations in a row have found them.
+    ``doubts``: sentences on speeds that are likely in another unit, once two evaluations in a row have found them. ``absent``: channels
+    without any value in the first rows, once.
     """
 
     noise: Mapping[str, float]
     held: Mapping[str, float]
     seconds: float
     doubts: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()
 
     def changes(self, estimator: TractionEstimator) -> list[str]:
         """What differs from what the estimator uses, in words; empty where nothing is worth a change."""
@@ -138,7 +140,8 @@ class SettingsLearner:
         seconds = sum(rows[-1 - len(self._channels)] - rows[0] for rows in self._kept.values())
         doubts = speed_warnings(log, self._vehicle)
         self._doubtful = self._doubtful + 1 if doubts else 0
-        return Learned(noise, held, seconds, tuple(doubts) if self._doubtful == 2 else ())
+        absent = tuple(name for name in self._channels if name not in known and self._number == 1)
+        return Learned(noise, held, seconds, tuple(doubts) if self._doubtful == 2 else (), absent)
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it, to the last bit; without what was given."""

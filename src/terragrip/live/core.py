@@ -259,12 +259,26 @@ class Core:
         learned = learner.add(row.time, taken)
         if learned is not None:
             out += [Event(row.time, "units", "estimator", doubt) for doubt in learned.doubts]
+            out += self._absent(row.time, learned.absent)
         changes = learned.changes(estimator) if learned is not None else []
         if learned is None or not changes:
             return
         learned.apply(estimator)
         text = f"from {learned.seconds:.0f} s of the drive: {'; '.join(changes)}"
         out.append(Event(row.time, "learned", "estimator", text))
+
+    def _absent(self, time: float, absent: Collection[str]) -> list[Event]:
+        """An event where channels without which nothing is estimated have not come since the start."""
+        needed = [name for name in default_channels(self.vehicle) if name in absent]
+        if not needed:
+            return []
+        torques = [name for name in needed if name.startswith("drive_torque_")]
+        text = f"{', '.join(needed)} never came: without that every row is a gap"
+        if len(torques) == int(self.vehicle.driven.sum()):
+            text += "; for slip alone give a profile of the speeds, without torques"
+        elif torques:
+            text += "; name it in the profile, or write 'driven: false' for its axle in the vehicle file"
+        return [Event(time, "schema", "estimator", text)]
 
     def _watch(self, estimate: Estimate, out: list[Output]) -> None:
         """An event where a warning begins."""
