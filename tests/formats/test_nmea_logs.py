@@ -73,3 +73,17 @@ def test_a_log_without_any_sentence_of_ours(tmp_path: Path) -> None:
     path.write_text("$GPGSV,1,1,00*79\n" * 5)
     with pytest.raises(InputError, match="no usable RMC, VTG or GGA"):
         read_table(path)
+
+
+def test_a_position_that_two_sentences_of_an_instant_give_alike_is_no_repeat(tmp_path: Path) -> None:
+    """Every receiver sends RMC and GGA of one instant; only a position that differs between them replaces one."""
+    path = write_nmea(tmp_path / "log.nmea")
+    assert not [note for note in read_table(path).notes if "repeat the time" in note]
+    text = path.read_text().replace("\r\n", "\n").split("\n")
+    sentence = text[61].split("*")[0].replace("5103.0000", "5103.0100")
+    checksum = 0
+    for letter in sentence[1:]:
+        checksum ^= ord(letter)
+    path.write_text("\n".join([*text[:61], f"{sentence}*{checksum:02X}", *text[62:]]))
+    notes = read_table(path).notes
+    assert "1 samples repeat the time of the one before with another value, and replace it." in notes

@@ -105,15 +105,20 @@ class SignalLog:
         place = dict(zip(orders, rows, strict=True))
         start = float(base[0]) if base[0] > SINCE_1970 else None
         base -= base[0]
-        doubled = sum(int(np.sum(row[1:] == row[:-1])) for row in rows)
-        if doubled:
-            notes.append(f"{doubled} samples repeat the time of the one before and replace it.")
+        replaced = {key: np.zeros(max(len(row) - 1, 0), dtype=np.bool_) for key, row in place.items()}
         units = {name: s.unit for name, s in self.signals.items() if s.unit}
         columns: dict[str, npt.NDArray[Any]] = {TIME: base}
         for name in list(self.signals):
             signal = self.signals.pop(name) if release else self.signals[name]
             order, row = orders[id(signal.time)], place[id(signal.time)]
-            columns[name] = _spread(signal.values[order], row, len(base))
+            values = signal.values[order]
+            replaced[id(signal.time)] |= _replaces(values, row)
+            columns[name] = _spread(values, row, len(base))
+        count = sum(int(np.sum(own)) for own in replaced.values())
+        if count:
+            notes.append(
+                f"{count} samples repeat the time of the one before with another value, and replace it."
+            )
         return LogTable(
             (TIME, *self.names), columns, units, self.source, self.sha256, tuple(notes), start, clocked=True
         )
@@ -128,6 +133,18 @@ class SignalLog:
         """The same log, in which a signal ``time`` is ``signal.time``: the table's own time takes that name."""
         names = tuple(_other_time(name) for name in self.names)
         return replace(self, names=names, signals={_other_time(name): s for name, s in self.signals.items()})
+
+
+def _replaces(values: npt.NDArray[Any], rows: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
+    """Whether each of the ``values`` but the first (n - 1,) is of the row (of ``rows``) of the one before, and another."""
+    again = rows[1:] == rows[:-1]
+    if not again.any():
+        return np.asarray(again)
+    before, after = values[:-1], values[1:]
+    alike = (after == before) | (
+        (after != after) & (before != before)
+    )  # NaN is unlike itself, among texts too
+    return np.asarray(again & ~alike.astype(np.bool_))
 
 
 def _other_time(name: str) -> str:
