@@ -68,6 +68,17 @@ def test_proposals_come_ranked_with_reason_and_unit(client: TestClient, folder: 
     }
 
 
+def test_what_inspect_remarks_on_the_log_comes_with_its_columns(client: TestClient, folder: Path) -> None:
+    """A time without a unit that is hardly in seconds: the form has the likely unit, and says that it is a guess."""
+    speed = np.linspace(0.5, 1.5, 100)
+    table = pd.DataFrame({"timestamp": 50 * np.arange(100), "gps_speed": speed, "wheel_speed_l": speed / 0.4})
+    table.to_csv(folder / "millis.csv", index=False)
+    found = client.get("/api/columns", params={"path": "millis.csv"}).json()
+    assert found["time"]["unit"] == "ms"
+    assert any("no unit is stated" in text for text in found["remarks"])
+    assert not any("Without a profile" in text for text in found["remarks"])
+
+
 @pytest.mark.parametrize(
     ("channels", "why"),
     [

@@ -43,6 +43,7 @@ export interface Look {
   ready: boolean;
   fitting: string[];
   refused: string;
+  remarks: string[]; // of inspect, on the whole log: a unit of time that nobody stated, a second clock
   time: Entry | null;
   columns: Column[];
   channels: Channel[];
@@ -132,6 +133,7 @@ export class Mapping {
       this.element,
       look.refused ? h("p", { class: "bad" }, `This log ${look.refused}.`) : null,
       h("p", { class: "hint" }, "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
+      look.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
       this.timeRow(look),
       h("div", { class: "map-rows", role: "group", "aria-label": "Channels" }, needed.map((channel) => this.row(channel))),

@@ -43,6 +43,9 @@ def columns_of(studio: Here, path: Named, vehicle: str = "") -> dict[str, Any]:
             "ready": look.inspection.ready,
             "fitting": look.inspection.fitting,
             "refused": look.inspection.refused,
+            "remarks": [
+                text for text in look.inspection.warnings if not text.startswith("Without a profile")
+            ],
             "time": look.time(),
             "columns": look.columns(),
             "channels": look.channels(wheels),
