@@ -13,7 +13,7 @@
 void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
-    tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0;
+    tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0, work = 0;
     int32_t found = 0, driven = 0, merely = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
     for (int32_t i = 0; i < n; i++) {
@@ -43,12 +43,16 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
     }
     for (int32_t j = 0; j < n && driven; j++) {
         c->at_rest[j] = weight[j] / whole;
+        c->at_work[j] = c->watched[j] ? c->at_rest[j] : 0;
+        work += c->at_work[j];
         for (int32_t i = 0; i < n; i++) {
             c->beyond[j][i] = i == j;
             for (int32_t a = 0; a < found; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
             c->beyond[j][i] *= c->pulls[i];
         }
     }
+    for (int32_t j = 0; j < n && work > 0; j++) c->at_work[j] /= work;
+    c->work = work > 0 ? work : 1;
     c->warps = driven - found;
     c->slopes = found > 1 && !(merely && c->warps) ? found - 1 : 0; /* see hidden.c */
     c->share = driven ? 1 / (tg_real)driven : 0;
@@ -97,12 +101,28 @@ static tg_real rims_way(const tg_estimator *e)
     return way * e->constants.share / e->belief.x[n + 1];
 }
 
+/* Slip of the place on the curve where the wheels are in the mean, from the one before: on one through the origin, A s/(s + c), the mean
+ * of their adhesions, which has `bend` of its secant as tangent. A wheel that spins alone moves it little, all of them take it along.
+ * Free wheels, if there are any, are at 0. */
+static tg_real usual_slip(const tg_estimator *e, tg_real before)
+{
+    const tgi_constants *c = &e->constants;
+    const tg_real bend = e->settings.tuned.bend, place = tgi_max(before, e->settings.tuned.least_slip), half = place / c->work * bend / (1 - bend);
+    tg_real mean = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        const tg_real slip = tgi_max(e->warped.each[i], 0);
+        mean += c->at_work[i] * slip / (slip + half);
+    }
+    return place * mean / (1 - bend);
+}
+
 static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
 {
     tgi_warped *w = &e->warped;
     const tgi_constants *c = &e->constants;
-    tg_real slip[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, mean = 0, all = 0;
-    if (!tgi_slips(e, 0, slip, &variance)) { /* what a turn does is a trend, and a gyroscope's noise is none */
+    tg_real slip[TG_MAX_WHEELS] = {0}, along[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, all = 0;
+    const int32_t fit = tgi_slips(e, (tg_real)e->direction * e->yaw_rate, along, &variance);
+    if (!tgi_slips(e, 0, slip, &variance) || !fit) { /* what a turn does is a trend, and a gyroscope's noise is none */
         memset(w->slip, 0, sizeof w->slip);
         return;
     }
@@ -122,13 +142,13 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
         w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
         pull += c->at_rest[i] * e->belief.x[i];
-        mean += c->at_rest[i] * slip[i];
+        w->each[i] += fresh * (along[i] - w->each[i]);
     }
     w->square += weight * gain * (square * c->share - w->square);
     w->noise += weight * gain * (noise - w->noise);
     w->level += weight * gain * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
     w->pulling += fresh * (pull - w->pulling);
-    w->slipping += fresh * (mean - w->slipping);
+    w->slipping = usual_slip(e, w->slipping);
 }
 
 /* After a row's estimate, `travelled` wheel radii behind the one before; `fresh` and `gain`: its weights over the length and the memory of
@@ -147,6 +167,17 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real
  * farther. */
 static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
 
+/* How far from the wheels' mean slip one of them is, for longer than unevenness lasts: it may be past the peak of its curve, where slip
+ * tells nothing of the load. */
+static tg_real farthest_wheel(const tg_estimator *e)
+{
+    const tgi_constants *c = &e->constants;
+    tg_real mean = 0, far = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->at_work[i] * e->warped.each[i];
+    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->at_work[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.each[i] - mean)) : far;
+    return far;
+}
+
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
  * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
  * those slips relative to the wheels' slip in the same rows (at most 1), since a load moves a small slip by little and a large one by
@@ -157,9 +188,10 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
     const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
+    const tg_real spun = beyond_line(k, farthest_wheel(e), inverse * e->constants.work); /* one for all wheels, likewise below: thrust stays */
     tg_real lasting = 0, farthest = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
-    const tg_real slope = explained * tgi_max(w->pulling, 0) * inverse / beyond_line(k, farthest, inverse); /* one for all: thrust stays */
+    const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) / tgi_square(spun);
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.estimation.drives import MASS, RADIUS, TIRE, WHEELS, Drive, drive, robot
+from tests.estimation.drives import BEARING, MASS, RADIUS, TIRE, WHEELS, Drive, drive, robot
 
 from terragrip.estimation import Estimates, estimate
 
@@ -168,3 +168,19 @@ def test_what_a_wheel_slipped_while_it_spun_is_not_its_usual() -> None:
         true = plain.truth[f"adhesion_{wheel}"][late]
         assert np.mean(np.abs(estimates[f"adhesion_{wheel}"][late] - true)) < 0.15 * np.mean(true)
         assert np.mean(estimates[f"adhesion_{wheel}_std"][late]) < 0.4 * np.mean(true)
+
+
+def test_a_wheel_that_spins_alone_does_not_move_the_adhesions() -> None:
+    """At the torque that it had one wheel spins, past its curve's peak: no load has shifted, and each wheel's force is what it was."""
+    plain = drive(30.0)
+    time, channels = plain.recording.time, dict(plain.recording.channels)
+    speed = channels["wheel_speed_fl"]
+    channels["wheel_speed_fl"] = speed * np.where((time > 20) & (time < 25), 10.0, 1.0)
+    channels["drive_torque_fl"] = channels["drive_torque_fl"] + RADIUS * BEARING * (
+        channels["wheel_speed_fl"] - speed
+    )
+    estimates = estimate(replace(plain.recording, channels=channels), robot())
+    spinning = (time > 21) & (time < 25)
+    for wheel in WHEELS:
+        true = plain.truth[f"adhesion_{wheel}"][spinning]
+        assert np.mean(np.abs(estimates[f"adhesion_{wheel}"][spinning] - true)) < 0.3 * np.mean(true)
