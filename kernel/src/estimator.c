@@ -210,7 +210,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
     tgi_find_silent(e, out->time);
-    e->scene.roughness = e->roughness.wander;
+    e->scene.bumps = tgi_unseen_bumps(e);
     e->scene.weight = drive->mass * e->settings.machine.gravity + drive->hitch_load;
     e->scene.unseen_load = tgi_unseen_load(e);
     if (e->constants.warps) e->scene.unseen_load += tgi_lasting_warp(e, e->scene.warp);

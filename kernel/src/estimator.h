@@ -51,7 +51,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */
     tg_real any_silent; /* whether any is, or the drawbar force */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
-    tg_real roughness; /* mean square of the variation of rho_s over uneven ground, see roughness.c */
+    tg_real bumps;     /* variance of rho_s by the gradients of uneven ground, see roughness.c */
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real reckoned; /* least variance of a ground speed that is not measured, see reckoning.c; else 0 */
@@ -105,7 +105,8 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real own;                     /* mean variance of an adhesion, by the filter */
-    tg_real wander;                  /* mean square of rho_s about its low-pass */
+    tg_real wander;                  /* mean square of rho_s about its low-pass, */
+    tg_real own_resistance;          /* mean variance of rho_s, by the filter */
     tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
 } tgi_roughness;
 
@@ -311,6 +312,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_relative(const tg_estimator *e, tg_real square);
 tg_real tgi_unseen_load(const tg_estimator *e);
+tg_real tgi_unseen_bumps(const tg_estimator *e);
 tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 

@@ -13,6 +13,7 @@
 #define tgi_log logf
 #define tgi_exp expf
 #define tgi_expm1 expm1f
+#define tgi_erfc erfcf
 #define tgi_cos cosf
 #define tgi_sin sinf
 #define tgi_ceil ceilf
@@ -24,6 +25,7 @@
 #define tgi_log log
 #define tgi_exp exp
 #define tgi_expm1 expm1
+#define tgi_erfc erfc
 #define tgi_cos cos
 #define tgi_sin sin
 #define tgi_ceil ceil

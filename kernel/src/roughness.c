@@ -1,8 +1,8 @@
 /* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load varies over the ground's
  * bumps: the force follows the load, and the estimate mistakes it for adhesion. Wheels at one slip share a curve, so the difference of one
  * wheel's adhesion from the others' within a few wheel radii counts as unseen load, a variance relative to the adhesion; where only one
- * wheel is driven, its difference from its own mean. rho_s varies likewise: the body pitches over the bumps, which accelerometer and
- * pitch sensor read as a slope, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
+ * wheel is driven, its difference from its own mean. rho_s varies likewise: a wheel that climbs a bump is held back by load times gradient,
+ * which no pitch sensor reads, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
 #include "estimator.h"
 
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */
@@ -74,8 +74,16 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     count_square(&r->own, own, least, k->uneven_most, gain);
     watch_hills(e, rho, travelled);
     if (!flowing) r->resistance = rho;
-    r->resistance += fresh * (rho - r->resistance);
+    r->resistance += travelled / (TG_LOAD_LENGTH + travelled) * (rho - r->resistance);
     count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
+    count_square(&r->own_resistance, e->belief.P[n * (tgi_stride(n) + 1)], TG_SMALL_RESISTANCE, k->uneven_most, gain);
+}
+
+/* Variance of rho_s by the gradients of bumps: its scatter within the length of unevenness, over which soil hardly changes, less the
+ * estimate's own noise (docs/decisions/0115). The low-pass, as long as they are, leaves half of it. */
+tg_real tgi_unseen_bumps(const tg_estimator *e)
+{
+    return 2 * tgi_max(e->roughness.wander - TG_NOISE_SHARE * e->roughness.own_resistance, 0);
 }
 
 /* A mean square of adhesions over that of the wheels' own. */

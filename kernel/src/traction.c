@@ -44,17 +44,27 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED],
     c->vv = Pv[v] + lanes_sum(vv);
 }
 
-/* Uneven ground (roughness.c): rho_s may hold all of what it wanders, and the wheels' loads come and go unseen. The ground speed may be
- * off for long (slow_speed.c). */
+/* Uneven ground (roughness.c): bumps hold the wheels back, and the wheels' loads come and go unseen. The ground speed may be off for
+ * long (slow_speed.c). */
 TG_INLINE void roughen(tgi_moments *c, const tg_real *x, const tgi_scene *scene, const int n)
 {
-    c->rr += scene->roughness + scene->unseen_grade;
+    c->rr += scene->bumps + scene->unseen_grade;
     c->vv = tgi_max(c->vv, scene->reckoned) + scene->slow_speed + scene->disputed + scene->late;
     for (int i = 0; i < n; i++) c->mm[i] += tgi_rough_adhesion(scene, x[i]) + scene->chatter[i];
 }
 
 /* Slip is within [-1, 1], so a spread above 1 means no more than 1; likewise of the efficiency. */
 TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 ? variance : 1); }
+
+/* Of a normal value only what is above 0 counts, as of a net traction for the efficiency: the mean square by which it may then differ from
+ * that of the mean, over the value's variance. */
+static tg_real above_zero(tg_real mean, tg_real sd)
+{
+    if (mean >= 6 * sd) return 1;
+    if (mean <= -6 * sd) return 0;
+    const tg_real x = mean / sd, above = tgi_erfc(-x * (tg_real)0.70710678) / 2, density = tgi_exp(-x * x / 2) * (tg_real)0.39894228;
+    return x < 0 ? tgi_max((1 + x * x) * above + x * density, 0) : above - x * density + x * x * (1 - above);
+}
 
 /* Net traction (paper eq. 5), slip and efficiency (paper eq. 7) of all wheels, delta method. `mean` is the mean adhesion over the load:
  * what a common radius error does to rho_s. */
@@ -84,10 +94,10 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
         const tg_real by_wheel = -share * g.wheel, by_ground = -share * g.ground;
         const tg_real cross = c->wm[i] * by_mu + c->wr[i] * by_rho, cross_v = c->vm[i] * by_mu + c->vr * by_rho;
         const tg_real by_radius = -share * g.radius - by_mu * mu - by_rho * mean;
+        const tg_real variance = share * share * slip_variance + 2 * (by_wheel * cross + by_ground * cross_v)
+                               + by_mu * (by_mu * c->mm[i] + 2 * by_rho * c->mr[i]) + by_rho * by_rho * c->rr + tgi_square(by_radius * error);
         o[TG_OUT_EFFICIENCY + i] = gross > 0 ? share * travel : 0;
-        o[TG_OUT_EFFICIENCY_STD + i] = bounded_root(share * share * slip_variance + 2 * (by_wheel * cross + by_ground * cross_v)
-                                                    + by_mu * (by_mu * c->mm[i] + 2 * by_rho * c->mr[i]) + by_rho * by_rho * c->rr
-                                                    + tgi_square(by_radius * error));
+        o[TG_OUT_EFFICIENCY_STD + i] = bounded_root(variance * above_zero(kappa, o[TG_OUT_NET_TRACTION_STD + i]));
     }
     o[TG_OUT_GROUND_SPEED] = v;
     o[TG_OUT_GROUND_SPEED_STD] = tgi_root(c->vv);
