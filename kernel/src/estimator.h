@@ -102,10 +102,11 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
 } tgi_slip_memory;
 
 typedef struct { /* uneven ground, see roughness.c */
-    tg_real adhesion[8], resistance; /* low-passed over the distance */
+    tg_real adhesion[8], resistance; /* low-passed over the distance, */
+    tg_real calm;                    /* rho_s over the length of bumps */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real own;                     /* mean variance of an adhesion, by the filter */
-    tg_real wander;                  /* mean square of rho_s about its low-pass, */
+    tg_real wander, bumps;           /* mean squares of rho_s about both: what soil and bumps do within metres, and bumps alone */
     tg_real own_resistance;          /* mean variance of rho_s, by the filter */
     tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
 } tgi_roughness;

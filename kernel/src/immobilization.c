@@ -74,7 +74,9 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
     l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
     l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
-    l.resistance_deviation = tgi_sqrt(tgi_max(tgi_square(o[TG_OUT_SOIL_RESISTANCE_STD]) - e->scene.unseen_grade, 0)); /* hills are slow */
+    /* Hills are slow; what soil does within metres is no error of its resistance, but no digging either. */
+    const tg_real known = tgi_square(o[TG_OUT_SOIL_RESISTANCE_STD]) - e->scene.unseen_grade - e->scene.bumps;
+    l.resistance_deviation = tgi_sqrt(tgi_max(known, 0) + e->roughness.wander);
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];

@@ -73,9 +73,11 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     r->square += gain * (square - r->square);
     count_square(&r->own, own, least, k->uneven_most, gain);
     watch_hills(e, rho, travelled);
-    if (!flowing) r->resistance = rho;
-    r->resistance += travelled / (TG_LOAD_LENGTH + travelled) * (rho - r->resistance);
+    if (!flowing) r->resistance = r->calm = rho;
+    r->resistance += fresh * (rho - r->resistance);
+    r->calm += travelled / (TG_LOAD_LENGTH + travelled) * (rho - r->calm);
     count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
+    count_square(&r->bumps, tgi_square(rho - r->calm), TG_SMALL_RESISTANCE, k->uneven_most, gain);
     count_square(&r->own_resistance, e->belief.P[n * (tgi_stride(n) + 1)], TG_SMALL_RESISTANCE, k->uneven_most, gain);
 }
 
@@ -83,7 +85,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
  * estimate's own noise (docs/decisions/0115). The low-pass, as long as they are, leaves half of it. */
 tg_real tgi_unseen_bumps(const tg_estimator *e)
 {
-    return 2 * tgi_max(e->roughness.wander - TG_NOISE_SHARE * e->roughness.own_resistance, 0);
+    return 2 * tgi_max(e->roughness.bumps - TG_NOISE_SHARE * e->roughness.own_resistance, 0);
 }
 
 /* A mean square of adhesions over that of the wheels' own. */

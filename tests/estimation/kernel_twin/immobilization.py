@@ -51,16 +51,18 @@ class Row:
 
 @contextmanager
 def undisputed() -> Iterator[None]:
-    """Within it estimates do not doubt a ground speed for what the filter has not followed of it, nor a resistance for unseen hills.
+    """Within it estimates do not doubt a ground speed for what the filter has not followed of it, nor a resistance for unseen hills, and
+    uneven ground is not learned.
 
-    The kernel's watch leaves both out of the SDs, and a table does not say how much of an SD they are: only without them are the table's
-    rows what the kernel sees. No figure depends on them but SDs of ground speed, slip and resistance.
+    The kernel's watch leaves these out of the SDs or counts more of them, and a table does not say how much of an SD they are: only without
+    them are the table's rows what the kernel sees. No figure depends on them but SDs.
     """
     made_by = estimator.settings_of
 
     def settings_of(*args: Any, **more: Any) -> Any:
         made = made_by(*args, **more)
         made.tuned.alike_sure, made.tuned.longest_walk, made.tuned.soil_spread = 1e12, 1e-12, 1e12
+        made.tuned.uneven_memory = 1e12
         return made
 
     estimator.settings_of = settings_of
