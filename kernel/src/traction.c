@@ -60,8 +60,8 @@ TG_INLINE tg_real bounded_root(tg_real variance) { return tgi_root(variance < 1 
  * that of the mean, over the value's variance. */
 static tg_real above_zero(tg_real mean, tg_real sd)
 {
-    if (mean >= 6 * sd) return 1;
-    if (mean <= -6 * sd) return 0;
+    if (mean >= 4 * sd) return 1; /* within 1e-4 */
+    if (mean <= -4 * sd) return 0;
     const tg_real x = mean / sd, above = tgi_erfc(-x * (tg_real)0.70710678) / 2, density = tgi_exp(-x * x / 2) * (tg_real)0.39894228;
     return x < 0 ? tgi_max((1 + x * x) * above + x * density, 0) : above - x * density + x * x * (1 - above);
 }
