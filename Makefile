@@ -62,11 +62,12 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 	    || echo "make: could not install$$missing; tests that have no other will be skipped" >&2; \
 	elif [ -n "$$missing" ]; then echo "make: without$$missing some tests are slower or skipped" >&2; fi
 
-# Three workers a processor, for nearly half of the time they wait for browsers, brokers and timers. A worker takes a whole file, then the next in order,
+# Two workers a processor: only the tests of live service, fleet and studio wait for what takes no processor, and each more worker takes some 8 s of it for
+# importing every test file, and then for what the tests of a room share. A worker takes a whole file, then the next in order,
 # so that what a file's tests share is made once. The workers fill the processors: no threads inside a product of matrices.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder -n
 pytest: collected studio system ## the Python tests alone
-	$(PYTEST) $(shell expr 3 \* $(WORKERS))
+	$(PYTEST) $(shell expr 2 \* $(WORKERS))
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is
 	@$(BIN)/python build_pages.py
@@ -171,16 +172,15 @@ build/kernel/$(1)/%: kernel/tests/%.c $$(patsubst kernel/src/%.c,build/kernel/$(
 	@mkdir -p $$(@D)
 	$$(CC) $$(KERNEL_FLAGS) $(2) -o $$@ $$(filter %.c %.o,$$^) -lm
 endef
-# Restoring from damaged snapshots is tried under the sanitizers too, where the compiler has them; `make test-long` runs all tests so.
+# `make test-long` runs all tests under the sanitizers.
 SANITIZERS := -g1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
-SANITIZED := $(shell echo 'int main(void) { return 0; }' | $(CC) $(SANITIZERS) -x c - -o /dev/null 2>/dev/null && echo build/kernel/sanitized/restore)
 .SECONDARY:
 $(eval $(call kernel_rules,sanitized,-Og $(SANITIZERS)))
 $(eval $(call kernel_rules,sanitized-float,-Og -DTG_FLOAT $(SANITIZERS)))
 $(eval $(call kernel_rules,double,))
 $(eval $(call kernel_rules,float,-DTG_FLOAT))
 
-kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) $(SANITIZED) ## compile the kernel with every warning an error, run its C tests
+kernel-test: $(foreach real,double float,$(KERNEL_TESTS:%=build/kernel/$(real)/%)) ## compile the kernel with every warning an error, run its C tests
 	@for program in $^; do echo "$$program"; ./$$program || exit 1; done
 
 # --- what takes long: sanitizers, fuzzers, soak ---------------------------------------------------------------------------

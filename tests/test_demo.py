@@ -24,7 +24,9 @@ ENDS = {"multi1": 150.0, "multi2": 300.0}  # s; of multi2 after the spell in whi
 def shorter(name: str, seed: int) -> SimulationResult:
     """A run of the campaign as the demo simulates it, the benchmarks' first minutes only."""
     scenario = Scenario.load(name)
-    scenario = scenario.model_copy(update={"duration": min(scenario.duration, ENDS.get(name, scenario.duration))})
+    scenario = scenario.model_copy(
+        update={"duration": min(scenario.duration, ENDS.get(name, scenario.duration))}
+    )
     return simulate(scenario, run_seed(seed, name), machine_seed=seed)
 
 

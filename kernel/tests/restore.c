@@ -1,5 +1,5 @@
 /* Restoring from bytes that are not a snapshot, though their checksum fits: refused, or an estimator that runs. Meant for the build under
- * the address and the undefined-behaviour sanitizers (`make kernel-test`). */
+ * the address and the undefined-behaviour sanitizers (`make test-long`). */
 #include "driven.h"
 #include "fields.h"
 

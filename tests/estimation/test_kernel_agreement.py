@@ -108,6 +108,7 @@ def test_agrees_over_5000_steps(engine, policy, long_problem):
     assert_agree(long_problem, Tuning(long_problem.walk, engine=engine, policy=policy, huber=3.0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("policy", ["supervised", "bank"])
 def test_the_long_problem_exercises_what_it_should(policy, long_problem):
     tested = KernelFilter(
@@ -181,18 +182,19 @@ def supervisor_output(case: Any, tuning: Tuning) -> Iterator[float]:
 
 
 @pytest.mark.parametrize("policy", ["fixed", "adaptive", "supervised"])
-def test_exact_and_unscented_kernels_agree(policy, long_problem):
+def test_exact_and_unscented_kernels_agree(policy, problem):
+    case = problem(2021, wheels=3, steps=400, condition=1e9, **LONG)
     options: dict[str, Any] = {"policy": policy, "huber": 3.0}
     exact, unscented = (
         KernelFilter(
-            long_problem.machine,
-            Tuning(long_problem.walk, engine=engine, **options),
-            long_problem.x0,
-            long_problem.P0,
+            case.machine,
+            Tuning(case.walk, engine=engine, **options),
+            case.x0,
+            case.P0,
         )
         for engine in ("exact", "unscented")
     )
-    for k in long_problem.instants:
+    for k in case.instants:
         for tested in (exact, unscented):
             if k.restart is not None:
                 tested.restart(*k.restart)
