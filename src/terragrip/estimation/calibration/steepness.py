@@ -77,28 +77,33 @@ def _regressed(
 
     Returns the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means.
     """
-    soils = int(soil.max()) + 1
-    design = np.zeros((*form.shape, soils + common.shape[1]))
-    design[:, np.arange(len(slip)), soil] = form
-    design[..., soils:] = common
-    turned = np.ascontiguousarray(np.swapaxes(design, 1, 2))
-    center = np.r_[np.full(soils, _PRIOR[0]), np.zeros(common.shape[1])]
+    soils, shared = int(soil.max()) + 1, common.shape[1]
+    own = np.arange(soils)
+    one = (soil[:, None] == own).astype(float)  # (n, soils): a level's term stands in its soil's column alone
+    crossed = (one[:, :, None] * common[:, None, :]).reshape(len(soil), -1)
+    squared = (common[:, :, None] * common[:, None, :]).reshape(len(soil), -1)
+    center = np.r_[np.full(soils, _PRIOR[0]), np.zeros(shared)]
     precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), np.maximum(common_std, 1e-6) ** -2.0]
     values = np.tile(center, (len(form), 1))
+    normal = np.zeros((len(form), len(center), len(center)))
+
+    def residual(inverse: Floats) -> Floats:
+        return np.abs(slip - form * inverse[:, soil] - values[:, soils:] @ common.T)
+
     for _ in range(_ROUNDS):
-        rest = np.abs(slip - _times(design, values))
+        rest = residual(values[:, :soils])
         noise = np.maximum(1.4826 * np.median(rest, axis=1, keepdims=True), 1e-4)
         weight = np.minimum(1.0, _HUBER * noise / np.maximum(rest, 1e-12)) / (noise**2 * repeats)
-        covariance = np.linalg.inv((turned * weight[:, None, :]) @ design + np.diag(precision))
-        values = _times(covariance, _times(turned, weight * slip) + precision * center)
+        weighted = weight * form
+        normal[:, own, own] = (weighted * form) @ one
+        normal[:, :soils, soils:] = (weighted @ crossed).reshape(-1, soils, shared)
+        normal[:, soils:, :soils] = np.swapaxes(normal[:, :soils, soils:], 1, 2)
+        normal[:, soils:, soils:] = (weight @ squared).reshape(-1, shared, shared)
+        covariance = np.linalg.inv(normal + np.diag(precision))
+        target = np.hstack([(weighted * slip) @ one, (weight * slip) @ common]) + precision * center
+        values = (covariance @ target[..., None])[..., 0]
     inverse = np.clip(values[:, :soils], _LEAST, _MOST)
     counts = np.bincount(soil, minlength=soils) / len(soil)
-    bounded = np.column_stack([inverse, values[:, soils:]])
-    loss = np.mean(np.abs(slip - _times(design, bounded)), axis=1)
+    loss = np.mean(residual(inverse), axis=1)
     spread = np.sqrt(counts @ covariance[:, :soils, :soils] @ counts)
     return loss, inverse, spread / (inverse @ counts)
-
-
-def _times(matrices: Floats, vectors: Floats) -> Floats:
-    """Each matrix (m, n, p) times its vector (m, p)."""
-    return np.asarray((matrices @ vectors[..., None])[..., 0])
