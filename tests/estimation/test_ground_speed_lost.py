@@ -16,10 +16,10 @@ from terragrip.ground.events import events
 LOST, BACK = 60.0, 130.0  # s
 
 
-def lost(made: Drive) -> tuple[Estimates, NDArray[np.bool_]]:
-    """Estimates of the drive without its ground speed between LOST and BACK, and the rows there in which it moves."""
+def lost(made: Drive, begin: float = LOST, end: float = BACK) -> tuple[Estimates, NDArray[np.bool_]]:
+    """Estimates of the drive without its ground speed from ``begin`` to ``end``, and the rows there in which it moves."""
     time, channels = made.recording.time, dict(made.recording.channels)
-    silent = (time > LOST) & (time < BACK)
+    silent = (time > begin) & (time < end)
     channels["ground_speed"] = np.where(silent, np.nan, channels["ground_speed"])
     estimates = estimate(replace(made.recording, channels=channels), robot())
     return estimates, silent & (made.truth["ground_speed"] > 0.05)
@@ -66,6 +66,42 @@ def test_wheels_that_spin_as_it_goes_do_not_spin_for_the_rest(imu: bool) -> None
     assert np.max(np.abs(estimates["slip_fl"] - made.truth["slip_fl"])[late]) < 0.15
 
 
+@pytest.mark.parametrize("imu", [True, False])
+def test_the_last_slip_is_taken_for_some_metres_of_each_outage(imu: bool) -> None:
+    """On softer ground for 10 s, and lost there for the second time."""
+    made = drive(125.0, rate=20.0, imu=imu, slip=lambda t: 0.1 + 0.1 * (t > 110))
+    time, channels = made.recording.time, dict(made.recording.channels)
+    channels["ground_speed"] = np.where((time > 40) & (time < 100), np.nan, channels["ground_speed"])
+    estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)), 120.0, 125.0)
+    assert np.mean(estimates["slip_fl"][rows & (time > 122)]) > 0.16
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_ground_that_ends_behind_the_last_measurement_is_in_the_interval(imu: bool) -> None:
+    """Last and usual slip differ, and which of them lies ahead is not known."""
+    made = drive(110.0, rate=20.0, imu=imu, slip=lambda t: 0.1 + 0.2 * ((t > 75) & (t < 81)))
+    estimates, rows = lost(made, 80.0, 100.0)
+    assert held(estimates, made, rows, "slip_fl") > 0.9
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_slips_that_a_drive_of_five_seconds_has_not_shown_are_in_the_interval(imu: bool) -> None:
+    made = drive(50.0, rate=20.0, imu=imu, slip=lambda t: 0.05 + 0.15 * (t > 7))
+    estimates, rows = lost(made, 5.0, 40.0)
+    assert held(estimates, made, rows, "slip_fl") > 0.9
+
+
+def test_the_usual_slip_is_learned_from_a_slow_receiver_as_well() -> None:
+    """Of one second a value; rows of the wheels come twenty times as often."""
+    made = drive(100.0, rate=20.0, slip=lambda t: 0.25 + 0 * t)
+    channels = dict(made.recording.channels)
+    channels["ground_speed"] = np.where(
+        np.arange(len(made.recording)) % 20 == 0, channels["ground_speed"], np.nan
+    )
+    estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)), LOST, 100.0)
+    assert np.mean(estimates["slip_fl"][rows & (made.recording.time > 90)]) > 0.2
+
+
 def test_an_accelerometers_bias_does_not_drive_a_vehicle_that_stands() -> None:
     made = drive(140.0, rate=50.0, imu=True, speed=stops)
     channels = dict(made.recording.channels)
@@ -74,6 +110,33 @@ def test_an_accelerometers_bias_does_not_drive_a_vehicle_that_stands() -> None:
     estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)))
     error = np.abs(estimates["ground_speed"] - made.truth["ground_speed"])[rows]
     assert np.quantile(error, 0.98) < 0.2
+
+
+def test_after_a_long_stop_it_starts_at_its_own_speed() -> None:
+    """Meanwhile nothing measured but the accelerometer, whose sum of noise and bias is no speed."""
+
+    def stop(t: Any) -> Any:
+        return 0.6 * np.where(
+            t < 72, np.clip(t / 2, 0, 1) * np.clip((72 - t) / 2, 0, 1), np.clip((t - 118) / 2, 0, 1)
+        )
+
+    made = drive(140.0, rate=50.0, imu=True, speed=stop)
+    channels = dict(made.recording.channels)
+    channels["acceleration_x"] = channels["acceleration_x"] + 0.15 * (made.recording.time > LOST)
+    estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)))
+    error = np.abs(estimates["ground_speed"] - made.truth["ground_speed"])
+    assert np.max(error[rows & (made.recording.time > 118)]) < 0.1
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_ten_seconds_of_spinning_hardly_move_the_usual_slip(imu: bool) -> None:
+    def spins(t: Any) -> Any:
+        return 0.1 + 0.6 * ((t > LOST - 10) & (t < LOST))
+
+    made = drive(140.0, rate=20.0, imu=imu, slip=spins, speed=lambda t: 0.6 * (1 - spins(t)) / 0.9)
+    estimates, rows = lost(made)
+    late = rows & (made.recording.time > LOST + 40)
+    assert np.mean(np.abs(estimates["slip_fl"] - made.truth["slip_fl"])[late]) < 0.05
 
 
 def test_an_event_says_so() -> None:
@@ -85,3 +148,11 @@ def test_an_event_says_so() -> None:
     assert all(np.isfinite(estimates[f"adhesion_{w}"][gap]).all() for w in WHEELS)
     (only,) = events(estimates)
     assert (only.kind, "no ground speed" in only.why) == ("gap", True)
+
+
+def test_a_stop_meanwhile_is_a_standstill() -> None:
+    made = drive(140.0, rate=20.0, speed=stops)
+    estimates, _ = lost(made)
+    phase, time = made.recording.time % 20, made.recording.time
+    stands = (time > LOST + 3) & (time < BACK) & (phase > 14) & (phase < 19)
+    assert np.mean(estimates["event"][stands] == "standstill") > 0.95

@@ -24,15 +24,23 @@ class Log:
     axles: int
 
 
-def log(by_load: float, by_soil: float = 0.0, seed: int = 1, axles: int = 1) -> Log:
-    """Two wheels an axle at constant torque for 150 s. Their loads and what the soil bears go to and fro, once on eight radii, in turns.
+def log(
+    by_load: float, by_soil: float = 0.0, seed: int = 1, axles: int = 1, *, diagonal: bool = False
+) -> Log:
+    """Two wheels an axle at constant torque for 150 s. Their loads and what the soil bears go to and fro, once on eight radii, in turns;
+    ``diagonal``: on the second axle the other way.
 
     All of it is in the slip: adhesion is A s/(s + c), twice as large at full slip as at the usual.
     """
     rng, time = np.random.default_rng(seed), np.arange(0, 150, 1 / RATE)
     wave = np.sin(2 * np.pi * SPEED * time / (8 * RADIUS))
     force, channels, adhesion = PULL * MASS * 9.81 / (2 * axles), {}, []
-    for side, sign in [(side + "ab"[axle], sign) for axle in range(axles) for side, sign in SIDES.items()]:
+    wheels = [
+        (side + "ab"[axle], -sign if diagonal and axle else sign)
+        for axle in range(axles)
+        for side, sign in SIDES.items()
+    ]
+    for side, sign in wheels:
         mu = PULL / (1 + sign * by_load * wave)
         share = mu / PULL / (1 + sign * by_soil * wave)  # of what the curve has at the usual slip
         slip = SLIP * share / (2 - share)
@@ -84,6 +92,19 @@ def test_loads_that_only_slips_show_are_in_the_interval(seed: int, axles: int) -
     error, spread = adhesions(log(by_load=0.1, seed=seed, axles=axles))
     assert np.std(error) > 0.6 * 0.1 * PULL / np.sqrt(2)
     assert np.mean(np.abs(error) <= 1.96 * spread) > 0.9
+
+
+def test_of_four_wheels_three_quarters_of_the_variance_are_found_from_side_to_side() -> None:
+    """The mean of all, along and across: the fourth pattern is the diagonal's."""
+    two, four = (np.mean(adhesions(log(by_load=0.1, axles=axles))[1] ** 2) for axles in (1, 2))
+    assert 0.7 < four / two < 0.85
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_loads_of_a_diagonal_that_only_slips_show_are_in_the_interval_once(seed: int) -> None:
+    error, spread = adhesions(log(by_load=0.1, seed=seed, axles=2, diagonal=True))
+    assert np.mean(np.abs(error) <= 1.96 * spread) > 0.93
+    assert np.sqrt(np.mean(spread**2)) < 3 * np.std(error)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -331,9 +331,16 @@ async def test_a_receiver_without_a_fix_and_one_at_another_baud_rate_are_named(v
             await asyncio.sleep(0.1)
         os.write(machine, b"\xff\x81" * 300)
         await until(lambda: events(service, "unreadable"))
+        os.write(
+            machine, b"\n" + sentence("GPRMC,123501,A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
+        )
+        await until(lambda: len(events(service, "source_lost")) == 2)
+        assert service.feeds[0].unreadable == 1  # what was read of no line is said once
     os.close(device)
     os.close(machine)
-    assert "no fix" in events(service, "source_lost")[0]
+    first, second = events(service, "source_lost")
+    assert "no fix" in first
+    assert "nothing came" in second
     assert "baud" in events(service, "unreadable")[0]
 
 
