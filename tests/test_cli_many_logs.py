@@ -276,3 +276,10 @@ def test_files_of_one_drive_may_lack_three_rows_or_two_seconds(
     for name, values in (("first", time), ("second", time[-1] + gap + time)):
         pq.write_table(pa.table({"time": values}), tmp_path / name)
     assert follows(tmp_path / "second", tmp_path / "first") is said
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_file_of_hardly_a_row_is_no_part_of_a_drive(tmp_path: Path, rows: int) -> None:
+    pq.write_table(pa.table({"time": 0.1 * np.arange(rows)}), tmp_path / "first")
+    pq.write_table(pa.table({"time": 0.5 + 0.1 * np.arange(20)}), tmp_path / "second")
+    assert follows(tmp_path / "second", tmp_path / "first") is False

@@ -10,6 +10,8 @@ import pytest
 from scipy.io import savemat
 
 from terragrip.formats import Profile, inspect, read
+from terragrip.formats.matlab_hdf5 import _of_hdf5
+from terragrip.formats.matlab_signals import Contents, walk
 
 FIELDS = ("time", "ground_speed", "wheel_speed_fl", "wheel_speed_fr")
 
@@ -59,3 +61,42 @@ def test_of_several_drives_the_first_is_proposed_whole_and_another_can_be_named(
     second = read(path, Profile.from_dict({"time": {"from": "time"}, "channels": channels}))
     np.testing.assert_allclose(second.channels["ground_speed"], run(2)["ground_speed"])
     assert any("runs holds 3 drives" in one for one in second.notes)
+
+
+@pytest.mark.parametrize(
+    ("parts", "runs"),
+    [
+        ([run(0), run(1)], {"all": 2}),
+        ([run(0)], {}),
+        ([{"time": run(k)["time"], "values": run(k)["ground_speed"]} for k in range(2)], {}),  # signals
+        ([{name: run(k)[name] for name in FIELDS[1:]} for k in range(2)], {}),  # without times
+        ([run(0), {**run(1), "yaw": run(1)["time"]}], {}),  # of unlike sensors
+        ([{**run(k), "name": f"sensor {k}"} for k in range(2)], {}),
+    ],
+)
+def test_only_structs_with_a_time_and_the_same_signals_are_drives(
+    parts: list[dict], runs: dict[str, int]
+) -> None:
+    contents = Contents()
+    walk({"all": parts}, "", contents, 0)
+    assert contents.runs == runs
+
+
+@pytest.mark.parametrize("kinds", [("cell", "cell"), ("cell", None), (None, None)])
+@pytest.mark.parametrize("counts", [(2, 2), (2, 3)])
+def test_cells_of_a_struct_are_no_array_of_structs(
+    tmp_path: Path, kinds: tuple[str | None, ...], counts: tuple[int, ...]
+) -> None:
+    """Of version 7.3: only the class tells a struct of two cells from an array of two structs."""
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        group, kept = file.create_group("s"), file.create_group("#refs#")
+        for name, kind, count in zip("ab", kinds, counts, strict=True):
+            field = group.create_dataset(name, (count, 1), dtype=h5py.ref_dtype)
+            if kind:
+                field.attrs["MATLAB_class"] = np.bytes_(kind)
+            for k in range(count):
+                one = kept.create_dataset(f"{name}{k}", data=np.arange(5.0)[None, :])
+                one.attrs["MATLAB_class"] = np.bytes_("double")
+                field[k, 0] = one.ref
+        found = _of_hdf5(file, group, 0, h5py)
+    assert isinstance(found, list) is (kinds == (None, None) and counts == (2, 2))

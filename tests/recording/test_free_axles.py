@@ -82,8 +82,12 @@ def rolling(radius: float, slip: float, *, turning: float = 0.0) -> list[str]:
         (0.3, 0.05, ""),
         (0.285, 0.01, "may be exchanged"),  # as the driven wheels' speeds would show a slip of 5 %
         (0.285, 0.04, ""),  # a radius within 5 %
-        (0.24, 0.1, "1.25 times as fast"),  # exchanged the front wheels would slip, too
-        (0.375, 0.05, "0.8 times as fast"),  # exchanged it would be the driven ones that lag
+        (0.24, 0.1, "1.25 times as fast as the ground, though"),  # exchanged the front wheels would slip, too
+        (
+            0.375,
+            0.05,
+            "0.8 times as fast as the ground, though",
+        ),  # exchanged it would be the driven ones that lag
         (np.inf, 0.05, ""),  # a sensor that reads 0 tells no radius
     ],
 )
