@@ -100,3 +100,13 @@ def test_cells_of_a_struct_are_no_array_of_structs(
                 field[k, 0] = one.ref
         found = _of_hdf5(file, group, 0, h5py)
     assert isinstance(found, list) is (kinds == (None, None) and counts == (2, 2))
+
+
+def test_numbers_that_name_no_class_are_no_array_of_structs(tmp_path: Path) -> None:
+    """As other programs than MATLAB write them."""
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        group = file.create_group("s")
+        for name in "ab":
+            group.create_dataset(name, data=np.arange(5.0)[None, :])
+        found = _of_hdf5(file, group, 0, h5py)
+    assert isinstance(found, dict)
