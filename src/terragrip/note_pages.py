@@ -32,6 +32,7 @@ PAGES = (
     ("the axes point the other way", "formats#in-a-profile"),
     ("write 'sign: -1'", "formats#in-a-profile"),
     ("time may not be in seconds", "formats#in-a-profile"),
+    ("written as hhmmss", "formats#dates"),
     ("angular_velocity_z turns with", "formats#in-a-profile"),
     ("the sensor is dead", "formats#what-the-motion-contradicts"),
     ("while other ", "formats#what-the-motion-contradicts"),

@@ -216,6 +216,8 @@ def test_words_of_a_summary_that_no_drive_above_needs() -> None:
         "With hardly a torque the wheels l, r slip by 0.51 [...]. Check the radius (not the diameter).",
         "drawbar_force is -0.16 of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile.",
         "pitch reaches 2.86 rad: it may be in degrees.",
+        "The samples are 50 s apart: time may not be in seconds.",
+        "time is a time of day written as hhmmss: 59 is followed by 100.",
     ],
 )
 def test_what_a_note_doubts_is_settled_before_all_else(note: str) -> None:

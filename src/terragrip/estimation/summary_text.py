@@ -25,6 +25,8 @@ _DOUBTFUL = (
     "check ",
     "Check ",
     "may be in ",
+    "may not be in ",
+    "written as hhmmss",
     "write 'sign: -1'",
     "converted from km/h",
     "against the direction of travel",
