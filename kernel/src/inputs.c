@@ -34,7 +34,7 @@ static void begin(tg_hold *h, tg_real x, tg_real noise)
 /* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
  * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
  * it enters the mean square clipped. `rate`: the change a second that is no spike. `moving`: else the increments are those of a
- * standstill, which show nothing of the start. */
+ * standstill, which show nothing of the start; but a speed needs none to be a spike there, as a log may begin at rest. */
 void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving)
 {
@@ -48,7 +48,7 @@ void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, t
         const tg_real before = before_spike(h, x);
         tg_real change = tgi_square(x - before), bound = k->spike * k->spike * (h->level + 2 * noise * noise) + tgi_square(rate * interval);
         h->spike = 0;
-        if (h->count > TG_LEAST_SAMPLES && change > bound) {
+        if ((h->count > TG_LEAST_SAMPLES || (rate > 0 && !moving)) && change > bound) {
             h->spike = change;
             h->mean = h->calm = before;
             change = bound;

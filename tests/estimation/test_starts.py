@@ -51,6 +51,21 @@ def test_before_the_first_motion_adhesion_is_what_the_torques_say():
         assert found[f"adhesion_{wheel}_std"][rest].min() > 0.25
 
 
+def test_a_spike_of_a_wheel_speed_before_the_first_motion_is_no_start():
+    """Motors off, one value of one wheel as of a vehicle at speed: nothing has moved."""
+    made = draw(Kind("light", "brixius", "plain"), 45, rate=20.0)
+    rest, wheel = made.recording.time < 1.0, made.vehicle.wheels[1]
+    speed = made.recording[f"wheel_speed_{wheel}"].copy()
+    speed[10] = 30.0
+    found = estimate(
+        replace(made.recording, channels={**made.recording.channels, f"wheel_speed_{wheel}": speed}),
+        made.vehicle,
+    )
+    for name in made.vehicle.wheels:
+        assert np.abs(found[f"adhesion_{name}"][rest]).max() < 0.05
+        assert found[f"adhesion_{name}_std"][rest].min() > 0.25
+
+
 def test_wheels_that_swing_in_the_air_do_not_turn_the_vehicle_round():
     """The rear wheels hang over a hole and swing under their speed control, backward as far as forward: the ground speed tells."""
     made = drive(16.0)
