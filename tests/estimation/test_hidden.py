@@ -87,10 +87,12 @@ def adhesions(made: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("axles", [1, 2])
-def test_loads_that_only_slips_show_are_in_the_interval(seed: int, axles: int) -> None:
-    """Ten per cent of load: .003 of slip, where a row's noise is .016. On two axles it goes from side to side, which is no warp."""
-    error, spread = adhesions(log(by_load=0.1, seed=seed, axles=axles))
-    assert np.std(error) > 0.6 * 0.1 * PULL / np.sqrt(2)
+@pytest.mark.parametrize("load", [0.1, 0.3])
+def test_loads_that_only_slips_show_are_in_the_interval(seed: int, load: float, axles: int) -> None:
+    """Ten per cent of load: .003 of slip, where a row's noise is .016. On two axles it goes from side to side, which is no warp. Thirty
+    per cent are far more than the adhesions show."""
+    error, spread = adhesions(log(by_load=load, seed=seed, axles=axles))
+    assert np.std(error) > 0.6 * load * PULL / np.sqrt(2)
     assert np.mean(np.abs(error) <= 1.96 * spread) > 0.9
 
 
