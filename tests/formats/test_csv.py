@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import subprocess
+import sys
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -288,6 +290,18 @@ def test_any_bytes_are_a_recording_or_refused(
         return
     assert "\n" not in message
     assert str(path) in message
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_reading_leaves_pandas_asleep(tmp_path: Path, log: pd.DataFrame, suffix: str) -> None:
+    """A command line that reads a minute of log must not wait for pandas."""
+    path = tmp_path / f"log.{suffix}"
+    log.to_csv(path, index=False) if suffix == "csv" else log.to_parquet(path)
+    code = (
+        f"import sys; from terragrip.formats import read; read({str(path)!r});"
+        "sys.exit(bool({'pandas', 'polars', 'pint', 'scipy'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 ROWS = 200

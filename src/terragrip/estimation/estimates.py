@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
+from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.engine import EVENTS
 from terragrip.recording.clock import clock_index
@@ -171,10 +172,8 @@ class Estimates:
         import pyarrow as pa
 
         numbers = {"time": self.time, **self.columns}
-        arrays: dict[str, Any] = {name: pa.array(values) for name, values in numbers.items()}
-        arrays |= {
-            name: pa.array(values, pa.string(), from_pandas=True) for name, values in self.labels.items()
-        }
+        arrays: dict[str, Any] = {name: floats(values) for name, values in numbers.items()}
+        arrays |= {name: texts(values) for name, values in self.labels.items()}
         arrays["event"] = self._events()
         fields = [
             pa.field(name, values.type, metadata=column_named(name)._asdict())
@@ -183,9 +182,7 @@ class Estimates:
         return pa.table(list(arrays.values()), schema=pa.schema(fields, {METADATA_KEY: self.metadata()}))
 
     def _events(self) -> pa.Array:
-        import pyarrow as pa
-
-        return pa.DictionaryArray.from_arrays(pa.array(self.event_codes), list(EVENTS)).cast(pa.string())
+        return choices(self.event_codes, EVENTS)
 
     def metadata(self) -> bytes:
         """The metadata of a Parquet file: `about` and `notes` as JSON."""
@@ -237,8 +234,6 @@ class Estimates:
     @classmethod
     def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
         """Convert an Arrow table of estimates; raises InputError if columns are missing or of another type."""
-        import pyarrow as pa
-
         missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
         if missing:
             raise InputError(
@@ -254,16 +249,11 @@ class Estimates:
         for name in table.column_names:
             if name == "event":
                 continue
-            values = table.column(name)
-            if pa.types.is_string(values.type):
-                words, codes = _coded(values)
-                labels[name] = np.array([word or "" for word in words], dtype=object)[codes]
-                continue
-            numbers = values.to_numpy()
-            if numbers.dtype.kind in "fiu":
-                columns[name] = numbers.astype(np.float64, copy=False)
+            values = values_of(table.column(name))
+            if values.dtype.kind in "fiu":
+                columns[name] = values.astype(np.float64, copy=False)
             else:
-                labels[name] = np.where(numbers == None, "", numbers)  # noqa: E711  (elementwise)
+                labels[name] = np.where(values == None, "", values)  # noqa: E711  (elementwise)
         return cls(columns.pop("time"), columns, _event_codes(table, source), labels, about, notes)
 
     @overload
@@ -305,15 +295,7 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
 
 
 def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:
-    words, codes = _coded(table.column("event"))
+    words, codes = codes_of(table.column("event"))
     if unknown := [word for word in words if word not in EVENTS]:
         raise InputError(f"there is no event {unknown[0]}", file=source, place="column event")
     return np.array([EVENTS.index(str(word)) for word in words], dtype=np.uint8)[codes]
-
-
-def _coded(column: pa.ChunkedArray) -> tuple[list[str | None], npt.NDArray[np.intp]]:
-    """The different texts of a column (n,), None where one is missing, and which of them each row has (n,)."""
-    import pyarrow as pa
-
-    coded = column.cast(pa.string()).combine_chunks().dictionary_encode("encode")
-    return coded.dictionary.to_pylist(), coded.indices.to_numpy().astype(np.intp)

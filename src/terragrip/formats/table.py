@@ -109,7 +109,11 @@ def since_clock_was_set(table: LogTable, column: str, unit: str) -> tuple[LogTab
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
-    """An Arrow column as NumPy; raises InputError on a type that holds neither numbers, texts nor dates."""
+    """An Arrow column as NumPy; raises InputError on a type that holds neither numbers, texts nor dates.
+
+    Reads Arrow's buffers, since its own ``to_numpy`` and its scalars import pandas, which takes longer than a
+    small log.
+    """
     import pyarrow as pa
 
     kind = column.type
@@ -119,11 +123,10 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
     if pa.types.is_null(kind):
         return np.full(len(column), np.nan)
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind):
-        return texts_of(column)
+        return _texts(column)
     if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-        ticks = column.cast(pa.int64()).fill_null(np.iinfo(np.int64).min)  # NumPy's not-a-time
-        unit = f"{'datetime64' if pa.types.is_timestamp(kind) else 'timedelta64'}[{kind.unit}]"
-        return np.asarray(ticks.to_numpy(zero_copy_only=False)).view(unit)
+        ticks = _numbers(column.cast(pa.int64()), np.iinfo(np.int64).min)  # NumPy's not-a-time
+        return ticks.view(f"{'datetime64' if pa.types.is_timestamp(kind) else 'timedelta64'}[{kind.unit}]")
     if pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
     elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
@@ -132,16 +135,37 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         )
     if column.null_count or not pa.types.is_integer(column.type):
         column = column.cast(pa.float64())
-    return np.asarray(column.to_numpy(zero_copy_only=False))
+    return _numbers(column, np.nan)
 
 
-def texts_of(column: Any) -> npt.NDArray[np.object_]:
-    """An Arrow column of texts as objects, missing = None; equal texts share one string."""
+def _numbers(column: Any, missing: float) -> npt.NDArray[Any]:
+    """Numbers as NumPy, not copied where they lie in one piece; what is missing becomes ``missing``."""
+    import pyarrow as pa
+
+    dtype = np.dtype(column.type.to_pandas_dtype())
+    parts = []
+    for chunk in column.chunks if isinstance(column, pa.ChunkedArray) else [column]:
+        buffer = chunk.buffers()[1]
+        if buffer is None or not len(chunk):
+            parts.append(np.full(len(chunk), missing, dtype=dtype))
+            continue
+        values = np.frombuffer(buffer, dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
+        if chunk.null_count:
+            absent = np.from_dlpack(chunk.is_null().cast(pa.int8())).astype(bool)
+            values = np.where(absent, np.asarray(missing, dtype=dtype), values)
+        parts.append(values)
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, dtype), *parts])
+
+
+def _texts(column: Any) -> npt.NDArray[np.object_]:
+    """Texts as objects, missing = None; equal texts share one string."""
+    import pyarrow as pa
     import pyarrow.compute as pc
 
-    coded = pc.dictionary_encode(column, null_encoding="encode")
-    parts = [
-        one.dictionary.to_numpy(zero_copy_only=False)[one.indices.to_numpy()]
-        for one in getattr(coded, "chunks", [coded])
-    ]
+    coded = pc.dictionary_encode(column)
+    chunks = coded.chunks if isinstance(coded, pa.ChunkedArray) else [coded]
+    parts = []
+    for chunk in chunks:
+        words = np.array([*chunk.dictionary.to_pylist(), None], dtype=object)
+        parts.append(words[_numbers(chunk.indices, len(words) - 1)])
     return np.concatenate([np.empty(0, dtype=object), *parts])

@@ -65,8 +65,7 @@ class Recorder:
         self._is_shared = thread is not None
         self._closing: list[Future[None]] = []
         # Now, or it would hold up the estimates when the first segment closes.
-        for package in ("pyarrow.parquet", "pandas"):  # Arrow imports pandas for its first column
-            self._thread.submit(import_module, package)
+        self._thread.submit(import_module, "pyarrow.parquet")
         self._syncing: Future[None] | None = None
         self.opening: list[Output] = []  # what opening brought: that a run goes on
         self.rows_kept = 0  # by this process

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.files import sync
 from terragrip.live.core import Ground, Output, Refusal, Row
@@ -110,7 +111,7 @@ class Segment:
 
         stamps = {"time": np.frombuffer(self.time), "arrival": np.frombuffer(self.arrival)}
         columns = {**stamps, **self.channels()}
-        return pa.table(columns)
+        return pa.table({name: floats(column) for name, column in columns.items()})
 
     def to_estimates(self, estimator: TractionEstimator) -> Estimates:
         """The rows' estimates as a table."""

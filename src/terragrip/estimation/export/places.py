@@ -122,8 +122,9 @@ def _layer(part: Estimates) -> Any:
         label = f"{column.description} [{column.unit}]" if column.unit else column.description
         fields.append(field.with_metadata({"GDAL:OGR:comment": label}))
     if part.start is not None:
-        clock = clock_times(part.time, part.start).astype("datetime64[ms]")
-        arrays.append(pa.array(clock, pa.timestamp("ms", "UTC")))
+        ticks = clock_times(part.time, part.start).astype("datetime64[ms]").view(np.int64)
+        clock = pa.Array.from_buffers(pa.int64(), len(ticks), [None, pa.py_buffer(ticks)])
+        arrays.append(clock.view(pa.timestamp("ms", "UTC")))
         fields.append(pa.field("clock", arrays[-1].type))
     binary = pa.Array.from_buffers(
         pa.binary(_POINT.itemsize), len(part), [None, pa.py_buffer(points.tobytes())]
