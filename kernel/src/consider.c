@@ -14,7 +14,7 @@ tg_status tg_consider_init(tg_consider *c, const tg_filter *f, int32_t columns)
     return TG_OK;
 }
 
-/* Columns run in `lanes` lanes. */
+/* Columns run in `lanes` lanes, a constant, so that what their rows share is read once and sums stay in registers. */
 #define EACH(k) for (int k = 0; k < lanes * TG_LANES; k += TG_LANES)
 
 /* Over the last step's map, with what one SD of each constant adds on the way. */
@@ -71,6 +71,12 @@ TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real
     }
 }
 
+TG_INLINE void consider(tg_consider *c, const tg_filter *f, const tg_real (*gain)[TG_ROWS], const tg_deviations *d, const int lanes)
+{
+    consider_predict(c, &f->passage, d, f->wheels, lanes);
+    consider_update(c, f, gain, d, f->wheels, lanes);
+}
+
 /* The mean gains of the modes of a bank. */
 static void mean_gains(const tg_filter *f, tg_real (*mean)[TG_ROWS])
 {
@@ -100,9 +106,13 @@ tg_status tg_consider_step(tg_consider *c, const tg_filter *f, const tg_deviatio
     tg_real mean[TG_MAX_CHANNELS][TG_ROWS];
     if (bank) mean_gains(f, mean);
     const tg_real (*const gain)[TG_ROWS] = bank ? (const tg_real(*)[TG_ROWS])mean : f->gain;
-    const int lanes = (columns + TG_LANES - 1) / TG_LANES;
-    consider_predict(c, &f->passage, deviations, n, lanes);
-    consider_update(c, f, gain, deviations, n, lanes);
+    switch ((columns + TG_LANES - 1) / TG_LANES) {
+    case 0: break;
+    case 1: consider(c, f, gain, deviations, 1); break;
+    case 2: consider(c, f, gain, deviations, 2); break;
+    case 3: consider(c, f, gain, deviations, 3); break;
+    default: consider(c, f, gain, deviations, TG_MAX_CONSIDERED / TG_LANES);
+    }
     return TG_OK;
 }
 

@@ -173,7 +173,7 @@ TG_INLINE void commit(tg_filter *f, const tgi_result *result, const int n, const
 /* What bank and single filter remember alike. */
 TG_INLINE void remember(tg_filter *f, const tgi_call *call, const tgi_plan *plan, const int n)
 {
-    f->passage = plan->passage;
+    plan_copy_passage(&f->passage, &plan->passage, n);
     f->used = plan->count;
     f->clock += (double)call->dt;
     f->slope[0] = call->before->slope;

@@ -121,6 +121,21 @@ TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_
     return TG_OK;
 }
 
+/* Field by field: a whole structure is copied by a slow instruction. */
+TG_INLINE void plan_copy_passage(tg_passage *to, const tg_passage *from, const int n)
+{
+    for (int i = 0; i < n; i += TG_LANES) {
+        lanes_store(to->phi + i, lanes_load(from->phi + i));
+        lanes_store(to->psi + i, lanes_load(from->psi + i));
+        lanes_store(to->b + i, lanes_load(from->b + i));
+        lanes_store(to->c + i, lanes_load(from->c + i));
+    }
+    for (int j = 0; j < TG_TWICE(n); j += TG_LANES) lanes_store(to->q + j, lanes_load(from->q + j));
+    to->keep = from->keep;
+    to->g = from->g;
+    to->dt = from->dt;
+}
+
 TG_INLINE tg_status plan_step(const tg_filter *f, const tgi_call *call, tgi_plan *plan, const int n)
 {
     if (!(call->dt >= 0)) return TG_TIME_REVERSED;
