@@ -1,6 +1,8 @@
 /* One raw sample in, one row of estimates out. */
 #include "estimator.h"
 
+#define TG_BATCH 32
+
 /* ---- the filter ---- */
 
 /* The row's channels along the travel, and their variances. The accelerometer's shocks last several samples, so they are no white noise,
@@ -318,22 +320,60 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     return TG_OK;
 }
 
+static void fill(tg_sample *sample, const double *time, const double *const *in, const int32_t *given, int32_t count, size_t row)
+{
+    sample->time = time[row];
+    for (int32_t k = 0; k < count; k++) sample->value[given[k]] = (tg_real)in[given[k]][row];
+}
+
+/* Rows are handed over in batches, column after column: one row at a time would touch a page of every column each time. */
+typedef struct {
+    tg_estimate row[TG_BATCH];
+    int32_t wanted[TG_OUT_SLOTS], columns;
+    size_t first, rows;
+} batch;
+
+static void hand_over(batch *b, double *const *out)
+{
+    for (int32_t k = 0; k < b->columns; k++) {
+        const int32_t slot = b->wanted[k];
+        double *const to = out[slot] + b->first;
+        for (size_t j = 0; j < b->rows; j++) to[j] = (double)b->row[j].value[slot];
+    }
+    if (out[TG_OUT_DISTANCE]) /* unrounded on the float build */
+        for (size_t j = 0; j < b->rows; j++) out[TG_OUT_DISTANCE][b->first + j] = b->row[j].distance;
+    b->first += b->rows;
+    b->rows = 0;
+}
+
 tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, const double *const *in, double *const *out,
                              uint8_t *event, size_t *done)
 {
     if (!e || !time || !in || !out || !event || !done) return TG_BAD_ARGUMENT;
-    tg_sample sample;
-    tg_estimate estimate;
-    for (*done = 0; *done < rows; ++*done) {
-        const size_t row = *done;
-        sample.time = time[row];
-        for (int32_t k = 0; k < TG_SLOTS; k++) sample.value[k] = in[k] ? (tg_real)in[k][row] : (tg_real)NAN;
-        const tg_status status = tg_estimator_update(e, &sample, &estimate);
-        if (status != TG_OK) return status;
-        event[row] = (uint8_t)estimate.event;
-        for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
-            if (out[k]) out[k][row] = (double)estimate.value[k];
-        if (out[TG_OUT_DISTANCE]) out[TG_OUT_DISTANCE][row] = estimate.distance; /* unrounded on the float build */
+    tg_sample sample[2]; /* the next one is filled while this one is worked on: lanes cannot be read right after their parts are written */
+    batch kept;
+    int32_t given[TG_SLOTS], n_given = 0;
+    tg_status status = TG_OK;
+    for (int32_t k = 0; k < TG_SLOTS; k++) {
+        sample[0].value[k] = sample[1].value[k] = (tg_real)NAN;
+        if (in[k]) given[n_given++] = k;
     }
-    return TG_OK;
+    kept.columns = 0;
+    kept.first = kept.rows = 0;
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
+        if (out[k]) kept.wanted[kept.columns++] = k;
+    *done = 0;
+    if (rows > 0) fill(&sample[0], time, in, given, n_given, 0);
+    for (; *done < rows; ++*done) {
+        const size_t row = *done;
+        if (row + 1 < rows) fill(&sample[(row + 1) % 2], time, in, given, n_given, row + 1);
+        tg_estimate *const estimate = &kept.row[kept.rows];
+        status = tg_estimator_update(e, &sample[row % 2], estimate);
+        if (status != TG_OK) break;
+        event[row] = (uint8_t)estimate->event;
+        kept.rows++;
+        if (kept.rows == TG_BATCH) hand_over(&kept, out);
+    }
+    hand_over(&kept, out);
+    return status;
 }
