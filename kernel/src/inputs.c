@@ -2,7 +2,7 @@
 #include "estimator.h"
 
 #define TG_LEAST_SAMPLES 4 /* before any can be called a spike */
-#define TG_PAUSE 10          /* intervals, beyond a gap: longer is a pause */
+#define TG_PAUSE 10        /* intervals, beyond a gap: a longer silence is a pause */
 #define TG_CHATTER ((tg_real)2 / 3)
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
@@ -226,11 +226,11 @@ void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u)
     u->hitch_load = drive->hitch_load;
 }
 
-/* Not measured for longer than a gap and ten of its intervals (of at most half a gap), or not yet. */
+/* Not measured for longer than a gap and TG_PAUSE of its intervals (of at most half a gap), or not yet. */
 static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
 {
     const tg_real gap = e->settings.gap, most = gap / 2;
-    return h->count == 0 || time - h->time > (double)(gap + 10 * (h->interval < most ? h->interval : most));
+    return h->count == 0 || time - h->time > (double)(gap + TG_PAUSE * (h->interval < most ? h->interval : most));
 }
 
 /* Whether the ground speed is silent while the vehicle drives: it is reckoned. */
