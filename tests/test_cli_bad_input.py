@@ -189,6 +189,19 @@ def test_the_other_readers_refuse_alike(
     assert not (place / "v2.yaml").exists()
 
 
+@pytest.mark.parametrize("command", ["estimate", "calibrate", "inspect"])
+def test_a_file_of_estimates_is_no_log(command: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its ``wheel_speed_fl_std`` was a wheel fl_std that the vehicle lacks, and a profile was proposed for it."""
+    of = ["--vehicle", str(place / "vehicle.yaml")]
+    assert main(["estimate", str(place / "log.csv"), *of, "-o", str(place / "e.parquet"), "-q"]) == 0
+    capsys.readouterr()
+    more = {"estimate": ["-o", str(place / "f.parquet")], "calibrate": ["-o", str(place / "f.yaml")]}
+    assert main([command, str(place / "e.parquet"), *of, *more.get(command, [])]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "e.parquet: holds estimates, not a log; give the log that they were made from" in line
+
+
 def test_nothing_to_calibrate_is_said_with_every_reason(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,7 +9,7 @@ PAGES = (
     ("the slower one pull", "formats#what-the-motion-contradicts"),
     ("of the axle's other wheel rises", "formats#what-the-motion-contradicts"),
     ("Straight ahead", "formats#what-the-motion-contradicts"),
-    ("is opposite to that of all others", "formats#what-the-motion-contradicts"),
+    ("Against the direction of travel", "formats#what-the-motion-contradicts"),
     ("by the force that these require", "formats#what-the-motion-contradicts"),
     ("times the weight on average", "formats#what-the-motion-contradicts"),
     ("times as far as ground_speed does", "formats#what-the-motion-contradicts"),

@@ -26,7 +26,6 @@ from terragrip.estimation.rims import (
 )
 from terragrip.estimation.settings import Thresholds
 from terragrip.estimation.slip_only import (
-    _against_travel,
     _dead_band,
     _notes,
     slip_reference_in,
@@ -231,26 +230,6 @@ def test_rims_that_read_zero_while_the_vehicle_moves_have_a_dead_band(
     assert (result, count) == (pytest.approx(band), rows if band else 0)
     turning = {**speeds, "wheel_speed_rr": np.full(120, 2.5)}
     assert _dead_band(log_of(ground_speed=ground, **turning), RIMS) == (0.0, 0)
-
-
-@pytest.mark.parametrize(("share", "odd"), [(0.49, False), (0.51, True)])
-def test_a_wheel_that_turns_against_the_travel_is_named(share: float, odd: bool) -> None:
-    back = np.arange(120) < 120 * share
-    log = log_of(
-        ground_speed=np.full(120, 1.0),
-        wheel_speed_rl=np.full(120, 2.0),
-        wheel_speed_rr=np.where(back, -2.0, 2.0),
-    )
-    words = _against_travel(log, RIMS)
-    assert words == (
-        ["The wheel speed of rr is against the direction of travel: write 'sign: -1' for it in the profile."]
-        if odd
-        else []
-    )
-    slow = log.with_channels(ground_speed=np.full(120, 0.09))
-    assert _against_travel(slow, RIMS) == []
-    reverse = log.with_channels(ground_speed=np.full(120, -1.0), wheel_speed_rl=np.full(120, -2.0))
-    assert bool(_against_travel(reverse, RIMS)) is not odd
 
 
 REST = "from 12 windows of the lightest work (the vehicle file says 0.8000 m)"

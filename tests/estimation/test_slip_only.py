@@ -10,7 +10,6 @@ import pytest
 
 import terragrip as tg
 from terragrip.errors import InputError
-from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.formats.reading import read_table
 from terragrip.formats.signals import Signal, SignalLog
 
@@ -205,8 +204,8 @@ def test_a_wheel_that_turns_against_the_travel_is_named(standing: float, said: b
     log = speeds_of(0.0)
     turning = np.arange(len(log)) >= standing * len(log)
     backward = np.where(turning, -log["ground_speed"] / 0.2, 0.0)
-    notes = slip_reference_in(log.with_channels(wheel_speed_fl=backward), robot()).notes
-    assert any("The wheel speed of fl is against the direction of travel" in note for note in notes) == said
+    notes = tg.estimate(log.with_channels(wheel_speed_fl=backward), robot()).notes
+    assert any("Against the direction of travel: wheel_speed_fl." in note for note in notes) == said
 
 
 def test_measured_car_on_a_road_does_not_slip(shared: Callable[[str], Path]) -> None:
@@ -252,7 +251,9 @@ def test_measured_rover(shared: Callable[[str], Path]) -> None:
     estimated = tg.estimate(
         tg.Profile.from_dict({"time": {"from": "time_s"}, **turned}).apply(read_table(log)), robot(radius)
     )
-    assert any("fl, rl is against the direction of travel" in note for note in estimated.notes)
+    assert any(
+        "Against the direction of travel: wheel_speed_fl, wheel_speed_rl." in note for note in estimated.notes
+    )
 
 
 @pytest.mark.parametrize(("noise", "most"), [(0.01, 0.1), (0.003, 0.3)])

@@ -120,11 +120,6 @@ def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool
         )
 
 
-def test_a_wheel_that_turns_against_all_others_is_named() -> None:
-    (note,) = [n for n in notes_on(skidding(), wheel_speed_rr=-1.0) if "opposite to that of all others" in n]
-    assert note.startswith("The wheel speed of rr is")
-
-
 def test_a_torque_that_falls_where_its_neighbour_rises_is_named() -> None:
     assert any(
         n.startswith("drive_torque_rr falls where") for n in notes_on(skidding(), drive_torque_rr=-1.0)

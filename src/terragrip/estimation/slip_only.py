@@ -64,7 +64,6 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
                 "Slip is missing where the rims are slower (event gap)."
             )
         notes.append(f"The rims read 0 in {rows} rows {why}")
-    notes += _against_travel(log, rims)
     return SlipReference(tuple(rims), zero, band, tuple(notes))
 
 
@@ -114,20 +113,3 @@ def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
     if len(moving) < _BLIND:
         return 0.0, 0
     return min(float(np.quantile(moving, 0.9)), _WIDEST), len(moving)
-
-
-def _against_travel(log: Recording, rims: Sequence[Rim]) -> list[str]:
-    """A sentence on wheels that turn backward while the machine moves forward, most of the time."""
-    ground, odd = log.channels["ground_speed"], []
-    known = np.isfinite(ground)
-    for rim in rims if known.any() else ():
-        speed = log.channels[rim.channel]
-        over = np.interp(log.time, log.time[known], ground[known])
-        moving = (np.abs(over) > _MOVING) & np.isfinite(speed) & (speed != 0)
-        if moving.any() and np.mean((speed * over)[moving] < 0) > 0.5:
-            odd.append(rim.wheel)
-    if not odd:
-        return []
-    return [
-        f"The wheel speed of {', '.join(odd)} is against the direction of travel: write 'sign: -1' for it in the profile."
-    ]

@@ -29,7 +29,7 @@ _DOUBTFUL = (
     "written as hhmmss",
     "write 'sign: -1'",
     "converted from km/h",
-    "against the direction of travel",
+    "in reverse turns",
     "are wrong there",
 )
 

@@ -23,6 +23,7 @@ from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.checks import refuse_estimates
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
@@ -117,12 +118,13 @@ def inspect(
     """Tell what is in a log, which of our channels it holds or lacks, and propose a profile.
 
     With a profile, what the log becomes through it is reported. With a vehicle, wheels and units are held against
-    it. Nothing is required of the log but that it is a table; raises InputError if it is none.
+    it. Nothing is required of the log but that it is a table; raises InputError if it is none, or one of estimates.
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
     databases = tuple(dbc)
     chosen = profile if isinstance(profile, Profile) or profile is None else Profile.load(profile)
     log, every = read_whole_or_thinned(path, (*databases, *(chosen.dbc if chosen else ())))
+    refuse_estimates(log.names, str(log.source))
     warnings, recording = list(log.notes), None
     if every > 1:
         warnings.insert(0, _SPARSE.format(_size(path) / 1e9, every))

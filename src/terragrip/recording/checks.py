@@ -66,6 +66,7 @@ _OF_VALUES = (
     "reading",
 )
 _NARROW = 6  # columns: time, unit, source and so on may be beside these two
+_OF_ESTIMATES = {"ground_speed", "ground_speed_std", "distance", "event"}
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")
 
 
@@ -78,9 +79,10 @@ def place(column: str, row: int, time: Floats | None = None, *, first_row: int =
 
 
 def require_columns(columns: Collection[str], source: str | None) -> None:
-    """Raise InputError unless time, ground_speed and a wheel speed are among the columns."""
+    """Raise InputError unless time, ground_speed and a wheel speed are among the columns, and they are not those of estimates."""
     if not columns:
         raise InputError("there are no columns", file=source, hint="give a table with a header")
+    refuse_estimates(columns, source)
     wheels = "wheel_based_speed" in columns or any(
         c.startswith("wheel_speed_") and len(c) > len("wheel_speed_") for c in columns
     )
@@ -98,6 +100,13 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
         hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
     page = "formats#in-a-profile"
     raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
+
+
+def refuse_estimates(columns: Collection[str], source: str | None) -> None:
+    """Raise InputError if the columns are those of estimates."""
+    if set(columns) >= _OF_ESTIMATES:
+        hint = "give the log that they were made from ('terragrip report' shows estimates)"
+        raise InputError("holds estimates, not a log", file=source, hint=hint)
 
 
 def how_to_pivot(columns: Collection[str]) -> str | None:

@@ -18,7 +18,7 @@ from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.reverse import reverse_warnings
+from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import RATIOS
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torque_signs import sign_warnings
@@ -83,6 +83,9 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     clock = [] if known is None else clock_warnings(whole, known)
     if clock:  # every other check is by time
         return [*codes, *clock, *made]
+    against = against_warnings(recording)
+    if against:  # every other check takes it that rims and ground go one way
+        return [*against, *frozen, *codes, *made, *times]
     shown = None if known is None else shown_turn(recording, track)
     exchanged = [] if known is None else exchange_warnings(recording, known, shown)
     sided, uneven = ([], []) if known is None else side_warnings(recording, known, shown)

@@ -1,4 +1,4 @@
-"""Speeds without a sign while the vehicle drives backward: sentences for the user, never errors.
+"""Speeds of a wrong sign, or without one while the vehicle drives backward: sentences for the user, never errors.
 
 A receiver's speed over ground is the size of the velocity, and counters of ticks have no direction. Backward, a turn to the left makes
 the left hub the faster one in size: with the sign lost, each side's slip is against the other side's hub.
@@ -21,10 +21,35 @@ if TYPE_CHECKING:
 _FAST = 0.3  # of what a twentieth of the drive exceeds
 _SHARE = 0.03  # of the driving that is backward
 _ALIKE = 0.9  # of the rows, or windows, that have one sign
+_MOSTLY = (
+    0.75  # of the rows in motion: a ground speed without a sign is that of forward driving in most of them
+)
 _FEWEST = 5  # windows
 _TOGETHER = 0.7  # correlation
 
 _WRONG = "in reverse turns the slips of both sides are wrong."
+
+
+def against_warnings(recording: Recording) -> list[str]:
+    """A sentence on speeds of wheels, or of the drive train, that are against the ground speed while both are large, mostly."""
+    channels, time = recording.channels, recording.time
+    names = [n for n in channels if n.startswith("wheel_speed_") or n == "wheel_based_speed"]
+    known = [n for n in ("ground_speed", *names) if np.isfinite(channels.get(n, np.nan)).any()]
+    if known[:1] != ["ground_speed"]:
+        return []
+    ground = filled(time, channels["ground_speed"])
+    odd = []
+    for name in known[1:]:
+        rim = channels[name]
+        moving = _large(rim) & _large(ground)
+        if np.sum((rim * ground)[moving] < 0) > _MOSTLY * moving.sum():
+            odd.append(name)
+    if not odd:
+        return []
+    other = "" if odd != known[1:] else " (or for ground_speed, if the vehicle drove backward)"
+    return [
+        f"Against the direction of travel: {', '.join(odd)}. In the profile write 'sign: -1' for each{other}."
+    ]
 
 
 def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:

@@ -24,7 +24,6 @@ Floats = npt.NDArray[np.float64]
 
 _LEAST = 15  # windows of 2 s
 _DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
-_BACKWARD = 0.5  # share of the driving in which a wheel turns against all others
 _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _PULLING = 0.1  # of an axle's load: torques that are compared
@@ -38,19 +37,14 @@ _TURNING = 0.03  # the same, in turns: sides that are driven against each other 
 
 
 def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> tuple[list[str], list[str]]:
-    """Sentences on wheels of a wrong sign or radius, and on torques of a wrong sign or scale. ``turn`` (n,) [rad/s], left positive: by a
+    """Sentences on wheels of a wrong radius, and on torques of a wrong sign or scale. ``turn`` (n,) [rad/s], left positive: by a
     sensor.
 
     Without one the vehicle drives straight ahead where all its rims agree; differences between them are then not checked.
     """
-    backward = _backward_warnings(recording, vehicle)
-    drive = (
-        None
-        if backward
-        else _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
-    )
+    drive = _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
     if drive is None:
-        return backward, []
+        return [], []
     straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
     if turn is None:
         apart = np.max([np.abs(np.diff(axle.rims, axis=0)[0]) for axle in drive.axles], axis=0)
@@ -127,34 +121,6 @@ class _Drive:
         slip, pull = (pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]).T
         size, hard = float(np.sqrt(np.mean(slip**2) * np.mean(pull**2))), float(np.sqrt(np.mean(pull**2)))
         return hard > _TURNING * axle.load / 2 and float(np.mean(slip * pull)) < -_OPPOSED * size
-
-
-def _backward_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A wheel that turns in the opposite direction to all others, most of the time."""
-    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
-    known = {
-        w: filled(recording.time, v) for w, v in speeds.items() if v is not None and np.isfinite(v).any()
-    }
-    if len(known) < 3:
-        return []
-    rims = np.array(list(known.values()))
-    signs = np.sign(
-        np.where(np.abs(rims) > _DRIVING * np.quantile(np.abs(rims), 0.95, axis=1, keepdims=True), rims, 0.0)
-    )
-    odd = []
-    for k, wheel in enumerate(known):
-        others = np.delete(signs, k, axis=0)
-        turning = signs[k] != 0
-        alone = turning & (others.sum(axis=0) == -signs[k] * len(others))
-        if turning.sum() >= _LEAST and alone.sum() > _BACKWARD * turning.sum():
-            odd.append(wheel)
-    return (
-        [
-            f"The wheel speed of {', '.join(odd)} is opposite to that of all others: write 'sign: -1' for it in the profile."
-        ]
-        if odd
-        else []
-    )
 
 
 def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_Axle], Floats]:
