@@ -72,11 +72,13 @@ def test_a_time_in_another_form_is_named(tmp_path: Path, form: str) -> None:
     )
 
 
-def test_days_of_a_spreadsheet_are_named(tmp_path: Path) -> None:
-    days = 45385.4166667 + table()["Zeit"] / 86_400
-    assert "column Zeit counts days, as a spreadsheet's dates do (45385.4 is 2024-04-03)" in said(
-        log(tmp_path / "a.csv", "Zeit", every=days)
-    )
+def test_days_of_a_spreadsheet_are_proposed_as_days_of_its_calendar(tmp_path: Path) -> None:
+    path = log(tmp_path / "a.csv", "Zeit", every=45385.4166667 + table()["Zeit"] / 86_400)
+    assert "Zeit: counts days, as a spreadsheet's dates do (45385.4 is 2024-04-03): d?" in said(path)
+    (tmp_path / "p.yaml").write_text(inspect(path).profile, encoding="utf-8")
+    recording = read(path, Profile.load(tmp_path / "p.yaml"))
+    assert recording.time[-1] == pytest.approx((ROWS - 1) / 10, abs=1e-5)
+    assert recording.to_pandas().index[0].isoformat().startswith("2024-04-03T10:00:00.00")
 
 
 def test_numbers_as_texts_and_durations_are_read(tmp_path: Path) -> None:

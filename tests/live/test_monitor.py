@@ -13,6 +13,7 @@ from terragrip.formats import Profile
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
+from terragrip.live.monitor import _silent
 from terragrip.live.payload import unpacker
 from terragrip.live.pulse import Pulse
 from terragrip.live.service import Service
@@ -160,6 +161,20 @@ async def test_the_period_of_a_source_is_its_own_and_no_silence_becomes_it():
     assert one.update(66.0)
     assert one.period == pytest.approx(1.0, abs=0.11)
     assert one.silence(67.5) == 1.5
+
+
+async def test_a_receiver_without_a_fix_that_falls_silent_has_no_excuse_any_more():
+    """The page of its health said "its sentences have no fix" long after its cable was cut."""
+    one, feed = pulse()
+    now = 100.0
+    feed.inbox.clock = lambda: now
+    feed.sample(now, {"ground_speed": 1.0})
+    assert one.update(now)
+    now = 110.0
+    feed.excuse("its sentences have no fix")
+    assert feed.excuse_at(110.5) == "its sentences have no fix"
+    assert (_silent(one, 110.5) or "").endswith(": its sentences have no fix")
+    assert _silent(one, 130.0) == "nothing came from serial:x for 30.0 s"
 
 
 async def test_a_slow_source_beside_a_fast_one_is_not_lost_between_its_messages(vehicle, short, port, sender):

@@ -104,9 +104,14 @@ def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
     )
 
 
-@pytest.mark.parametrize(("rate", "factor"), [(20.0, 60.0), (1.0, 60.0), (20.0, 3600.0)])
+@pytest.mark.parametrize(
+    ("rate", "factor", "unit"),
+    [(20.0, 60.0, "min"), (1.0, 60.0, "min"), (20.0, 3600.0, "h"), (20.0, 86400.0, "d")],
+)
 @pytest.mark.parametrize("placed", [True, False])
-def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, placed: bool) -> None:
+def test_time_in_minutes_hours_or_days_is_named_alone(
+    rate: float, factor: float, unit: str, placed: bool
+) -> None:
     columns = drive(rate) | {"time": drive(rate)["time"] / factor}
     if not placed:
         columns = {n: v for n, v in columns.items() if n not in ("latitude", "longitude")}
@@ -114,6 +119,7 @@ def test_time_in_minutes_or_hours_is_named_alone(rate: float, factor: float, pla
     assert re.search(
         r"change their speed by .* more than any ground allows: time may not be in seconds", note
     )
+    assert f"unit: {unit}}}" in note
 
 
 def test_a_drive_of_two_starts_tells_of_its_clock() -> None:

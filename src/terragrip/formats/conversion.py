@@ -25,7 +25,17 @@ from terragrip.formats.signals import SAME, union
 from terragrip.formats.table import LogTable, since_clock_was_set
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
-from terragrip.recording.columns import SINCE_1970, columns_of, numbers, seconds, stamps_of, start_of, texts
+from terragrip.recording.columns import (
+    DAY,
+    SINCE_1970,
+    SPREADSHEET_1970,
+    columns_of,
+    numbers,
+    seconds,
+    stamps_of,
+    start_of,
+    texts,
+)
 from terragrip.recording.repeats import merged
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
@@ -187,10 +197,12 @@ def first_start(origin: TimeSource, stamps: Column) -> float | None:
 
 def _since_1970(stamps: Column, origin: TimeSource) -> float | None:
     """When time 0 was [s since 1970], where the stamps (n,), numbers, are so large that they count from then."""
-    first = float(stamps[0]) * factor_to(origin.unit, "s") if len(stamps) else np.nan
+    unit = factor_to(origin.unit, "s")
+    first = float(stamps[0]) * unit if len(stamps) else np.nan
     if not SINCE_1970 < first < np.inf:
         return None
-    return first if origin.zero == "first" else 0.0
+    before = SPREADSHEET_1970 * unit if unit == DAY else 0.0
+    return (first if origin.zero == "first" else 0.0) - before
 
 
 def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Column, float | None]:

@@ -18,7 +18,7 @@ from terragrip.formats.proposal import is_ready, missing_channels, profile_text,
 from terragrip.formats.reading import read_log, recording_of
 from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.spoilt import days_in, notes_on, numbers_of
+from terragrip.formats.spoilt import notes_on, numbers_of
 from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
@@ -148,7 +148,6 @@ def inspect(
     proposals = seen.proposals(GENERAL, machine)
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
-    warnings += days_in(seen.floats(), GENERAL)
     if seen.stamp is not None:
         warnings += [f"{seen.stamp.name}: {seen.stamp.doubt}"] * bool(seen.stamp.doubt)
         warnings += other_clocks(numbers, seen.stamp.name, seen.units)

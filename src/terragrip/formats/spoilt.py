@@ -17,8 +17,6 @@ from terragrip.written_times import FORMS, doubt
 _ROWS = 100_000  # of a column that are looked at
 _MOST = 0.5  # of the cells are numbers: the column is one of numbers
 _LISTED = 4  # columns that are named
-_DAYS = (3e4, 8e4)  # since 1899-12-30: 1982 to 2119; or seconds of a day,
-_STEP = 2e-4  # whose rows are never as close: 17 s in days
 
 
 def numbers_of(column: npt.NDArray[Any]) -> Floats | None:
@@ -46,23 +44,6 @@ def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, t
                 first = next(row for row, cell in enumerate(cells) if cell)
                 notes.append(f"column {name}, row {first + 1}: {cells[first]!r} is not a time; {FORMS}.")
     return notes[:_LISTED] + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
-
-
-def days_in(numbers: Mapping[str, Floats], vocabulary: Vocabulary) -> list[str]:
-    """Sentences on columns of numbers, by name (n,), that go by the name of a time and count days, as a spreadsheet's dates do."""
-    notes = []
-    for name, values in numbers.items():
-        known = values[np.isfinite(values)]
-        if len(known) < 2 or not vocabulary.read(name).has("time"):
-            continue
-        low, high = float(known.min()), float(known.max())
-        step = float(np.median(np.abs(np.diff(known))))
-        if _DAYS[0] < low and high < _DAYS[1] and 0 < step < _STEP:
-            day = np.datetime64("1899-12-30") + np.timedelta64(int(low), "D")
-            notes.append(
-                f"column {name} counts days, as a spreadsheet's dates do ({low:.6g} is {day}): write 2024-04-03 10:00:00.5."
-            )
-    return notes
 
 
 def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:

@@ -11,12 +11,14 @@ from terragrip.arrays import Floats
 from terragrip.formats.candidates import kind_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.clock import clock_unit
-from terragrip.recording.columns import SINCE_1970
+from terragrip.recording.columns import SINCE_1970, SPREADSHEET_1970
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
 _FINER = ("s", "ms", "us", "ns")
+_DAYS = (3e4, 8e4)  # of a spreadsheet: 1982 to 2119; or seconds of a day,
+_DAY_STEP = 2e-4  # whose rows are never as close: 17 s in days
 _FIELD_RATE = 5.0  # s between samples: no log of a drive has more
 
 
@@ -109,10 +111,14 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
 
 def _unit(known: Floats, stated: str | None) -> tuple[str, str]:
     """The unit of stamps: as ``stated``, or as a clock since 1970 has it, or by their spacing, which is a doubt unless it is seconds."""
-    unit = stated or clock_unit(float(np.max(np.abs(known), initial=0.0)))
+    most = float(np.max(np.abs(known), initial=0.0))
+    unit = stated or clock_unit(most)
     if unit is not None:
         return unit, ""
     step = _step(known)
+    if _DAYS[0] < np.min(known, initial=np.inf) and most < _DAYS[1] and 0 < step < _DAY_STEP:
+        day = np.datetime64("1970-01-01") + np.timedelta64(int(known[0]) - SPREADSHEET_1970, "D")
+        return "d", f"counts days, as a spreadsheet's dates do ({known[0]:.6g} is {day}): d?"
     unit = next((u for u in _FINER if step * factor_to(u, "s") < _FIELD_RATE), "s")
     if unit == "s":
         return unit, ""

@@ -118,7 +118,8 @@ def add_sinks(page: Metrics, outboxes: Sequence[Outbox]) -> None:
 
 def _silent(pulse: Pulse, now: float) -> str | None:
     silence = pulse.silence(now)
-    why = f": {pulse.feed.excuse}" if pulse.feed.excuse else ""
+    excuse = pulse.feed.excuse_at(now)
+    why = f": {excuse}" if excuse else ""
     if not pulse.has_begun:
         return f"nothing has come from {pulse.feed.name} yet{why}"
     if silence > max(FLOOR, 2.0 * pulse.period):

@@ -109,7 +109,7 @@ class Statistics:
             silence = pulse.silence(now)
             if silence > max(_SILENT, 10.0 * self.period, 2.0 * pulse.period):
                 pulse.is_silent = True
-                feed.lost(f"{feed.excuse or 'nothing came'} for {silence:.1f} s")
+                feed.lost(f"{feed.excuse_at(now) or 'nothing came'} for {silence:.1f} s")
 
     def second(self, now: float) -> bool:
         """Whether a second is over; then its rates are worked out."""

@@ -80,6 +80,9 @@ def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: st
 
 SINCE_1970 = 1e8
 """Larger stamps [s] count from 1970, smaller ones from some start of their own."""
+DAY = 86400.0  # s
+SPREADSHEET_1970 = 25569
+"""Days of a spreadsheet's dates, which count from 1899-12-30, until 1970."""
 
 
 def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:

@@ -25,7 +25,7 @@ _OFTEN = 0.99  # of the changes are slower (right logs: by 2.5 m/s² at most, co
 _ENOUGH = 4000  # rows that are examined
 _OUTRUN = 3.0  # the positions' spread over the way driven
 _SPREAD = 20.0  # m
-_CLOCK = "time may not be in seconds: give its unit in a profile, 'time: {from: ..., unit: min}'"
+_LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # s
 
 _PART = 1200.0  # s of the log at most, in which the speeds' lag counts as one
 _DRIFT, _CERTAIN = (
@@ -48,7 +48,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     changes = _changes(time, speed, rims)
     if changes > _GRIP:
         return [
-            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_CLOCK}."
+            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_clock(changes / _GRIP)}."
         ]
     rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
     some = rows[:: max(1, len(rows) // _ENOUGH)]
@@ -57,10 +57,17 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     )  # where either has gaps, the other has values
     spread = _spread(recording, rows)
     if spread > max(_SPREAD, _OUTRUN * way):
+        clock = _clock(spread / max(_OUTRUN * way, 1e-9))
         return [
-            f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {_CLOCK}."
+            f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {clock}."
         ]
     return []
+
+
+def _clock(factor: float) -> str:
+    """What to write where time runs too fast by ``factor`` at least: the shortest unit that explains it."""
+    unit = next((unit for unit, size in _LONGER.items() if size >= factor), "d")
+    return f"time may not be in seconds: give its unit in a profile, 'time: {{from: ..., unit: {unit}}}'"
 
 
 def drift_warnings(recording: Recording) -> list[str]:

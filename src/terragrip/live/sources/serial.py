@@ -70,6 +70,6 @@ class SerialSource:
             if sentence.kind == "VTG" and self._has_rmc:
                 continue  # it repeats the speed of RMC
             self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
-            feed.excuse = "" if sentence.has_fix else "its sentences have no fix"
+            feed.excuse("" if sentence.has_fix else "its sentences have no fix")
             if sentence.fields:
                 feed.fields(sentence.fields)
