@@ -14,8 +14,6 @@ from terragrip.units import _BASE, UnitError, factor_to, parse_unit, quantity
 
 _PINT_NAMES = {
     "t": "tonne",
-    "Nm": "N*m",
-    "kNm": "kN*m",
     "kmh": "km/h",
     "kmph": "km/h",
     "rev": "turn",
@@ -24,6 +22,20 @@ _PINT_NAMES = {
     "Grad": "degree",
     "kp": "kgf",
 }
+MOMENTS = {
+    "Nm": 1.0,
+    "kNm": 1e3,
+    "daNm": 10.0,
+    "mNm": 1e-3,
+    "Ncm": 0.01,
+    "Nmm": 1e-3,
+    "kgm": 9.80665,
+    "kpm": 9.80665,
+    "kgfcm": 0.0980665,
+    "lbft": 1.3558179483314,
+    "lbfin": 0.1129848290276,
+}
+"""Force and lever written together (NIST SP 811, appendix B.8)."""
 _DIMENSIONS = ("[mass]", "[length]", "[time]", "[current]")
 
 
@@ -53,6 +65,7 @@ def test_table_agrees_with_pint(symbol: str) -> None:
         ("1 lb-ft", "N m", 1.3558179483314),
         ("1 ft.lb", "N m", 1.3558179483314),
         ("1 kg m", "N m", 9.80665),
+        *((f"1 {unit}", "N m", size) for unit, size in MOMENTS.items()),
         ("90 Grad", "rad", 1.57079632679),
         ("10 kn", "m/s", 5.14444444444),
         ("2 %", "1", 0.02),

@@ -17,6 +17,16 @@ _MAGIC = (
     (b"MATLAB 5.0", "is a MATLAB file", "export it as CSV or Parquet"),
     (b"SQLite format 3", "is an SQLite database", "export it as CSV or Parquet"),
     (b"ARROW1", "is an Arrow or Feather file", "save it as Parquet"),
+    (
+        b"TDSm",
+        "is a LabVIEW TDMS file",
+        "export it as CSV, or by nptdms: TdmsFile.read(...).as_dataframe().to_csv(...)",
+    ),
+    (
+        b"LabVIEW Measurement",
+        "is a LabVIEW measurement file, whose header is no table's",
+        "delete the lines above 'X_Value', write time for it, and delete 'Comment' at that line's end",
+    ),
     (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
 )
 

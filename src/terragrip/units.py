@@ -32,7 +32,7 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "N": (1.0, (1, 1, -2, 0)), "kN": (1e3, (1, 1, -2, 0)), "daN": (10.0, (1, 1, -2, 0)),
     "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "kp": (STANDARD_GRAVITY, (1, 1, -2, 0)),
     "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
-    "Nm": (1.0, (1, 2, -2, 0)), "kNm": (1e3, (1, 2, -2, 0)), "J": (1.0, (1, 2, -2, 0)),
+    "J": (1.0, (1, 2, -2, 0)),
     "W": (1.0, (1, 2, -3, 0)), "kW": (1e3, (1, 2, -3, 0)),
     "Pa": (1.0, (1, -1, -2, 0)), "kPa": (1e3, (1, -1, -2, 0)), "MPa": (1e6, (1, -1, -2, 0)),
     "hPa": (1e2, (1, -1, -2, 0)), "bar": (1e5, (1, -1, -2, 0)), "mbar": (1e2, (1, -1, -2, 0)),
@@ -46,6 +46,8 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "kt": (1852 / 3600, (0, 1, -1, 0)), "kts": (1852 / 3600, (0, 1, -1, 0)),
     "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
 }  # fmt: skip
+_MOMENT = re.compile(r"^([kmM]?N|daN|kgf?|kp|lbf?)(mm?|cm|ft|in)$")
+"""A force, or a mass for its weight, and the length of its lever, written together: Nm, daNm, kgm, lbft."""
 _SUPERSCRIPTS = str.maketrans(
     {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
 )
@@ -173,7 +175,7 @@ def _plain(text: str) -> str:
     plain = text.translate(_SUPERSCRIPTS).replace("^-^", "^-").strip()
     if _TURNS_A_MINUTE.fullmatch(plain):
         return "rpm"
-    plain = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "*", plain)
+    plain = _MOMENT.sub(r"\1*\2", re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "*", plain))
     return plain if plain.startswith("g_") else _POWER.sub(r"^\1", plain)
 
 

@@ -52,6 +52,14 @@ def write_hdf5(path: Path, content: dict[str, Any]) -> Path:
             inner.attrs["MATLAB_class"] = np.bytes_("struct")
             for key, part in value.items():
                 put(inner, key, part)
+        elif isinstance(value, list):  # an array of structs: for each field references to its values
+            inner, kept = group.create_group(name), group.file.require_group("#refs#")
+            inner.attrs["MATLAB_class"] = np.bytes_("struct")
+            for key in value[0]:
+                field = inner.create_dataset(key, (len(value), 1), dtype=h5py.ref_dtype)
+                for k, one in enumerate(value):
+                    put(kept, f"{name}{key}{k}", one[key])
+                    field[k, 0] = kept[f"{name}{key}{k}"].ref
         elif isinstance(value, str):
             item = group.create_dataset(name, data=np.array([[ord(c)] for c in value], dtype=np.uint16))
             item.attrs["MATLAB_class"] = np.bytes_("char")
@@ -146,3 +154,46 @@ def test_a_matrix_with_a_column_for_each_wheel_is_asked_about(tmp_path: Path) ->
     scipy.io.savemat(tmp_path / "run.mat", {"log": log})
     (sentence,) = (s for s in inspect(tmp_path / "run.mat").missing if "log.omega" in s)
     assert "'wheel_speed_fl: {from: \"log.omega[0]\"}'" in sentence
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_the_export_of_dspace_controldesk(tmp_path: Path, version: str) -> None:
+    """``X`` are time vectors, ``Y`` signals, each with the number of its own, counted from 1 (data.X.Data, data.Y(k).Name, .XIndex)."""
+    clocks = [TIME, TIME[::10]]
+    signals = [
+        ("Model Root/Wheels/wheel_speed_l/Out1", 30 * SPEED, "rpm", 1),
+        ('"Model Root"/"Wheels"/"wheel_speed_r"', 31 * SPEED, "rpm", 1),
+        ("Model Root/GNSS/ground_speed/Out1", 3.6 * SPEED[::10], "km/h", 2),
+        ("Model Root/broken/Out1", SPEED[:7], "", 1),
+    ]
+    x = [{"Name": "", "Data": clock} for clock in clocks]
+    y = [{"Name": n, "Data": d, "Unit": u, "XIndex": np.array([i])} for n, d, u, i in signals]
+    path = tmp_path / "rec.mat"
+    if version == "5":
+        scipy.io.savemat(path, {"rec": {"X": structs(x), "Y": structs(y), "Capture": "c"}})
+    else:
+        write_hdf5(path, {"rec": {"X": x, "Y": y, "Capture": "c"}})
+    seen = inspect(path)
+    assert {c: p.entry for c, p in seen.proposals.items()} == {
+        "wheel_speed_l": {"from": "rec.Model Root/Wheels/wheel_speed_l", "unit": "rpm"},
+        "wheel_speed_r": {"from": "rec.Model Root/Wheels/wheel_speed_r", "unit": "rpm"},
+        "ground_speed": {"from": "rec.Model Root/GNSS/ground_speed", "unit": "km/h"},
+    }
+    assert any(
+        "another length than the time vector" in n and "rec.Model Root/broken" in n for n in seen.warnings
+    )
+    (tmp_path / "p.yaml").write_text(seen.profile)
+    recording = read(path, tmp_path / "p.yaml")
+    known = np.isfinite(recording["ground_speed"])
+    np.testing.assert_allclose(recording.time[known], TIME[::10] - TIME[0])
+    np.testing.assert_allclose(recording["ground_speed"][known], SPEED[::10])
+    np.testing.assert_allclose(recording["wheel_speed_l"], SPEED * np.pi)
+
+
+def structs(parts: list[dict[str, Any]]) -> np.ndarray:
+    """An array of structs, as SciPy writes one."""
+    result = np.zeros((1, len(parts)), dtype=[(name, object) for name in parts[0]])
+    for k, part in enumerate(parts):
+        for name, value in part.items():
+            result[0, k][name] = value
+    return result

@@ -41,7 +41,6 @@ def _place() -> dict[str, np.ndarray]:
         ("CAN1.TSC1.EngnRqstdTrqTrqLmt", "%"),  # an engine's torque limit, on bus 1
         ("CAN1.EEC1.EngineDemandPercentTorque", "%"),
         ("engineTorquePercent", "%"),  # of what, with friction or without?
-        ("wheel_torque_fl", "%"),  # no dimension of a torque
         ("velocity_down", "m/s"),
         ("vert-vel", "m/s"),
         ("angular_acceleration_x", "rad/s^2"),
@@ -111,6 +110,26 @@ def test_what_is_of_a_motor_asks_for_the_gear_ratio(
     unknown = [line for line in found.profile.splitlines() if "scale: 1.0" in line]
     assert len(unknown) == 8
     assert all("# ? " in line for line in unknown)  # no scale of ours passes for a value that was found
+
+
+@pytest.mark.parametrize("name", ["drive_torque_{}", "torque_{}", "torque_{}_pct"])
+def test_a_torque_in_per_cent_asks_for_its_scale_and_its_profile_loads(tmp_path: Path, name: str) -> None:
+    """``unit: '%'`` was proposed, which a profile refuses, or nothing."""
+    columns, units = {"ground_speed": SPEED}, {}
+    for wheel in ("l", "r"):
+        columns[f"wheel_speed_{wheel}"] = SPEED / 0.5
+        columns[name.format(wheel)] = 20 + 5 * np.cos(TIME / 5)
+        units[name.format(wheel)] = "%"
+    proposal = _propose(columns, units)["drive_torque_l"]
+    assert proposal.entry == {"from": name.format("l"), "scale": 1.0, "unit": "N m"}
+    assert proposal.give == "a torque in %: the scale in N m per % must be given by you"
+    table = pd.DataFrame({"time": TIME, **columns}).rename(columns={n: f"{n} [%]" for n in units})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "p.yaml").write_text(
+        inspect(tmp_path / "log.csv").profile.replace("scale: 1.0", "scale: 1.5")
+    )
+    recording = read(tmp_path / "log.csv", tmp_path / "p.yaml")
+    np.testing.assert_allclose(recording["drive_torque_r"], 1.5 * columns[name.format("r")])
 
 
 def test_a_proposed_profile_fits_a_new_vehicle_with_a_wheel_a_side(tmp_path: Path) -> None:

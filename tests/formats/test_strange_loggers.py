@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from terragrip.errors import InputError
+from terragrip.formats import read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.recognition import Proposal, propose
 from terragrip.formats.vocabulary import GENERAL
@@ -113,3 +115,25 @@ def test_names_in_other_languages_and_paths(name: str, channel: str | None) -> N
     column = columns_of((name,), {}, {}, GENERAL)[name]
     made = [c.channel for c in candidates_of(column)]
     assert made[:1] == ([channel] if channel else [])
+
+
+def test_labviews_files_are_refused_with_what_makes_a_table_of_them(tmp_path: Path) -> None:
+    """The header of a .lvm has a row for each property of its channels (NI's "Specification for the LabVIEW Measurement File")."""
+    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab", "***End_of_Header***\t", "\t"]
+    head += ["Channels\t3\t\t\t", "Samples\t50\t50\t50\t", "Y_Unit_Label\tm/s\trad/s\trad/s\t"]
+    head += ["***End_of_Header***\t\t\t\t", "X_Value\tground_speed\twheel_speed_l\twheel_speed_r\tComment"]
+    rows = [f"{k / 10:.6f}\t{1 + k / 100:.6f}\t{5 + k / 20:.6f}\t{5 + k / 20:.6f}" for k in range(50)]
+    path = tmp_path / "log.lvm"
+    path.write_text("\r\n".join([*head, *rows, ""]), newline="")
+    with pytest.raises(InputError) as refused:
+        read(path)
+    assert refused.value.problem.startswith("is a LabVIEW measurement file")
+    assert refused.value.hint == (
+        "delete the lines above 'X_Value', write time for it, and delete 'Comment' at that line's end"
+    )
+    header = head[-1].replace("X_Value", "time").removesuffix("\tComment")
+    path.write_text("\r\n".join([header, *rows, ""]), newline="")
+    assert read(path)["ground_speed"][-1] == pytest.approx(1.49)
+    (tmp_path / "log.tdms").write_bytes(b"TDSm\x0e\0\0\0" + bytes(100))
+    with pytest.raises(InputError, match="is a LabVIEW TDMS file; export it as CSV"):
+        read(tmp_path / "log.tdms")

@@ -266,7 +266,7 @@ def _fits(kind: str, channel: str) -> bool:
     if channel.startswith("wheel_speed_"):
         return kind in ("rotation", "speed")
     if channel.startswith("drive_torque_"):
-        return kind in ("torque", "current")
+        return kind in ("torque", "current", "share")
     if target == "force":
         return kind in ("force", "mass")
     return kind == target

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.errors import InputError
 from terragrip.files import sha256
@@ -21,7 +20,7 @@ from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_objects import TICKS, plain
 from terragrip.formats.matlab_records import IN_RECORDS, STREAM, resolved
 from terragrip.formats.matlab_signals import Contents, seconds_of, walk
-from terragrip.formats.matlab_values import Array, Opaque
+from terragrip.formats.matlab_values import Array, Opaque, read_array
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
 from terragrip.formats.table import LogTable, Wanted
@@ -130,18 +129,18 @@ def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samp
     matrix, whole = None, np.empty(0)
     for name in chosen:
         if not contents.signals:
-            yield Samples(name, None, _read(contents.loose[name]).ravel().astype(np.float64))
+            yield Samples(name, None, read_array(contents.loose[name]).ravel().astype(np.float64))
             continue
         clock, values, column = contents.signals[name]
         length = int(np.prod(clock.shape))
         if id(clock) not in clocks:
             clocks.add(id(clock))
-            yield Clock(id(clock), seconds_of(_read(clock).ravel(), contents.scales.get(id(clock), 1.0)))
+            yield Clock(id(clock), seconds_of(read_array(clock).ravel(), contents.scales.get(id(clock), 1.0)))
         if isinstance(values, Array) and values.part is not None:
             flat = values.column(column or 0, length)
         else:
             if matrix is not values:
-                matrix, whole = values, _read(values)  # columns of one matrix stand side by side
+                matrix, whole = values, read_array(values)  # columns of one matrix stand side by side
             flat = whole.reshape(length, -1)[:, column or 0]
         yield Samples(name, id(clock), np.asarray(flat, dtype=np.float64), contents.units.get(name))
 
@@ -195,10 +194,6 @@ def _of_one_length(loose: Mapping[str, Any]) -> dict[str, Any]:
     lengths = [int(np.prod(value.shape)) for value in loose.values()]
     length = max(set(lengths), key=lambda n: (lengths.count(n), n))
     return {name: value for (name, value), n in zip(loose.items(), lengths, strict=True) if n == length}
-
-
-def _read(value: Any) -> npt.NDArray[Any]:
-    return value.read() if isinstance(value, Array) else value
 
 
 def _in_blocks(path: str) -> TableOnDisk | None:

@@ -2,11 +2,12 @@
 
 A numeric column that has a time vector beside it (in the same struct, or at the top), Simulink's "structure with time" and
 arrays with ``tout``, a struct with Time and Data as a timeseries is exported, and lists of these with names, as the elements
-of a Dataset.
+of a Dataset; dSPACE's X and Y.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.matlab_values import Array, Opaque
+from terragrip.formats.matlab_values import Array, Opaque, read_array
 from terragrip.units import is_common
 
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
@@ -22,6 +23,7 @@ _SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _DATA = ("data", "values")
 _UNITS = ("unit", "units", "dataunits")
 _NAMES = ("name", "label", "signalname", "blockname")
+_PORT = re.compile(r"/Out1$")  # the first output of a block, which is named by the block
 _WIDEST = 32  # columns of a matrix that are signals
 _DEEPEST = 12
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
@@ -72,6 +74,8 @@ def _is_run(part: Any, first: Any) -> bool:
 
 
 def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Any) -> None:
+    if _x_and_y(struct, name, contents):
+        return
     lower = {key.lower(): key for key in reversed(list(struct))}  # of names that differ in case, the first
     clock_name = _clock_name(struct, name, contents)
     clock = above if clock_name is None else struct[clock_name]
@@ -121,22 +125,42 @@ def _clock_name(struct: Mapping[str, Any], name: str, contents: Contents) -> str
 
 
 def _runs_forward(value: Any) -> bool:
-    stamps = np.asarray(value.read() if isinstance(value, Array) else value).ravel()
+    stamps = read_array(value).ravel()
     return bool((stamps[1:] > stamps[:-1]).all())
+
+
+def _x_and_y(struct: Mapping[str, Any], name: str, contents: Contents) -> bool:
+    """dSPACE ControlDesk's export: whether the struct is one. ``Y`` are signals, each with the number of its time vector in ``X``."""
+    clocks, signals = (_structs(struct.get(key)) for key in ("X", "Y"))
+    if not clocks or not signals or not all(_is_vector(one.get("Data")) for one in clocks):
+        return False
+    for k, one in enumerate(signals):
+        index = one.get("XIndex")
+        at = int(np.ravel(read_array(index))[0]) - 1 if _is_numeric(index) else 0
+        block = _PORT.sub("", _own_name(one).replace('"', ""))
+        own, values = _joined(name, block or f"Y[{k}]"), one.get("Data")
+        if values is None or not _is_vector(values) or not 0 <= at < len(clocks):
+            continue
+        clock = clocks[at]["Data"]
+        length, count = max(clock.shape), max(values.shape)
+        if count == length:
+            _add(contents, own, clock, values, length, one.get("Unit"))
+        else:
+            contents.odd[own] = count, length
+    return True
+
+
+def _structs(value: Any) -> list[Mapping[str, Any]]:
+    """The structs of an array of them, or the one; none of anything else."""
+    parts = [value] if isinstance(value, Mapping) else list(np.ravel(value)) if _is_list(value) else []
+    return parts if all(isinstance(part, Mapping) for part in parts) else []
 
 
 def _structure_with_time(signals: Any, clock: Any, length: int, name: str, contents: Contents) -> bool:
     """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
-    parts = (
-        [signals] if isinstance(signals, Mapping) else list(np.ravel(signals)) if _is_list(signals) else []
-    )
     is_used = False
-    for k, part in enumerate(parts):
-        if (
-            isinstance(part, Mapping)
-            and _is_numeric(part.get("values"))
-            and length in part["values"].shape[:2]
-        ):
+    for k, part in enumerate(_structs(signals)):
+        if _is_numeric(part.get("values")) and length in part["values"].shape[:2]:
             own = _own_name(part) or f"signals[{k}]"
             _add(contents, _joined(name, own), clock, part["values"], length)
             is_used = True

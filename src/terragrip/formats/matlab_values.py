@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 
@@ -32,3 +33,8 @@ class Array:
         if self.part is not None:
             return self.part(rows, number)
         return self.read().reshape(length, -1)[rows, number]
+
+
+def read_array(value: Any) -> npt.NDArray[Any]:
+    """The numbers of an `Array`, or of what is one already."""
+    return value.read() if isinstance(value, Array) else np.asarray(value)

@@ -180,10 +180,13 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
     unit, give = guess.unit, ""
     shown: tuple[str, ...] = ()
     kind = kind_of(unit)
-    if channel.startswith("drive_torque_") and kind in ("current", None) and guess.column.name.has("current"):
+    torque = channel.startswith("drive_torque_")
+    is_current = torque and kind in ("current", None) and guess.column.name.has("current")
+    if is_current or (torque and kind == "share"):
         entry |= {"scale": 1.0, "unit": "N m"} if guess.column.unit else {"scale": 1.0}
         side = " times the gear ratio" if guess.column.name.has("motor") else ""
-        give = f"a current: the scale in N m per A{side} must be given by you"
+        what, of = ("a current", "A") if is_current else ("a torque in %", "%")
+        give = f"{what}: the scale in N m per {of}{side} must be given by you"
     elif channel.startswith("wheel_speed_") and kind == "speed" and unit is not None:
         radius = radius_of(vehicle, channel.removeprefix("wheel_speed_"))
         entry |= {"scale": float(f"{factor_to(unit, 'm/s') / (radius or 1.0):.6g}"), "unit": "rad/s"}

@@ -106,8 +106,8 @@ _ELISION = re.compile(r"\b[dl]['\u2019](?=\w)", re.IGNORECASE)
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
-_OF_MESSAGES = frozenset({"fix", "status", "state", "raw"})
-"""Words that name messages and topics too, and then say nothing of each field in them."""
+_OF_MESSAGES = frozenset({"fix", "status", "state", "raw", "exp"})
+"""Words that name messages, topics and experiments too, and then say nothing of each field in them."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
 
 
