@@ -27,7 +27,7 @@ def library() -> Path:
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         made = path.with_suffix(f".{os.getpid()}")
-        command = [*compiler(), *FLAGS, "-O1", "-DTG_FLOAT", "-shared", "-fPIC", f"-I{HEADER.parent}"]
+        command = [*compiler(), *FLAGS, "-O0", "-DTG_FLOAT", "-shared", "-fPIC", f"-I{HEADER.parent}"]
         subprocess.run([*command, *map(str, sources), "-lm", "-o", str(made)], check=True)
         made.replace(path)  # at once, for another test worker may be at the same
     return path

@@ -74,12 +74,15 @@ def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
 
 
 def axe_violations(tab: Any, theme: str, impacts: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """What axe-core says of a page in a theme, of these weights or of any."""
+    """What axe-core says of a page in a theme, of these weights or of any; in dark of its colours, for of the rest light says the same."""
     tab.emulate_media(color_scheme=theme)
     tab.wait_for_function("theme => document.documentElement.dataset.theme === theme", arg=theme)
     if not tab.evaluate("() => 'axe' in window"):
         tab.add_script_tag(path=str(AXE))
-    result = tab.evaluate("() => axe.run(document, { resultTypes: ['violations'] })")
+    rules = {"runOnly": {"type": "tag", "values": ["cat.color"]}} if theme == "dark" else {}
+    result = tab.evaluate(
+        "options => axe.run(document, options)", {"resultTypes": ["violations"], "selectors": False, **rules}
+    )
     return [
         (v["id"], v["nodes"][0]["html"][:120])
         for v in result["violations"]

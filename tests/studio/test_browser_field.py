@@ -246,7 +246,7 @@ def test_axe_finds_nothing(browser: Any, served: Served) -> None:
     for where, ready, themes, width in (
         ("path=nowhere.parquet", "#map-empty", ("light",), 390),
         ("map=field.gpkg&layer=soil", "#map[data-cells]", ("light",), 390),
-        ("map=none.gpkg", "#map-empty:has-text('none.gpkg')", ("dark",), 1280),
+        ("map=none.gpkg", "#map-empty:has-text('none.gpkg')", ("light", "dark"), 1280),
         ("map=field.gpkg&layer=change", "#map[data-cells]", ("light", "dark"), 1280),
     ):
         tab.set_viewport_size({"width": width, "height": 720})
