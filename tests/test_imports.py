@@ -24,8 +24,10 @@ def _is_type_checking(node: ast.stmt) -> bool:
 
 
 def _imports(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Every import below a node, also within functions, but not those for types alone."""
+    """Every import below a node, also within functions, but not those for types alone; expressions, most of a file, hold none."""
     for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            continue
         if isinstance(child, ast.Import | ast.ImportFrom):
             yield child
         elif isinstance(child, ast.If) and _is_type_checking(child):

@@ -92,7 +92,7 @@ def test_parquet_says_what_its_columns_mean(estimates, tmp_path):
 def test_an_excel_workbook(written, estimates):
     from openpyxl import load_workbook
 
-    book = load_workbook(written(".xlsx"))
+    book = load_workbook(written(".xlsx"), read_only=True)
     assert book.sheetnames == ["estimates", "columns", "about"]
     heads, *rows = book["estimates"].iter_rows(values_only=True)
     table = pd.DataFrame(rows, columns=heads)
