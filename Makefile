@@ -209,7 +209,7 @@ soak-short:
 	@$(MAKE) --no-print-directory soak SOAK_SECONDS=60
 
 kernel-sanitized: $(foreach real,sanitized sanitized-float,$(KERNEL_TESTS:%=build/kernel/$(real)/%))
-	@for program in $^; do echo "$$program"; ./$$program > /dev/null || exit 1; done
+	@for program in $^; do echo "$$program"; ./$$program 10000 > /dev/null || exit 1; done
 
 fuzz: fuzz-kernel fuzz-parsers ## fuzz the kernel (libFuzzer) and every parser (atheris); longer: make fuzz FUZZ_SECONDS=600
 

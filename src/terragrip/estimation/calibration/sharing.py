@@ -116,7 +116,7 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
 def _solved(
     data: Sharing, start: Floats | None = None, *, stretch: float = 1.0, form: int | None = None
 ) -> _Solution:
-    """The unknowns where the curves are steeper by a factor than they look, or of another form than fits best; from a start nearby in less time."""
+    """The unknowns where curves are steeper by a factor than they look, or of another form than fits best; sooner from a start nearby."""
     w = data.torque.shape[1]
     problem = replace(_Problem.of(data), stretch=stretch, form=form)
     if start is None:
