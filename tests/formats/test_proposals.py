@@ -372,6 +372,15 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
     assert "twist.twist.linear.x" in text
 
 
+def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newtons() -> None:
+    """The first of the six was, surely: the vertical one of a cell that lists it first."""
+    name = "/drawbar/wrench.wrench.{}.{}"
+    columns = {name.format(what, axis): SPEED + TIME for what in ("torque", "force") for axis in "zyx"}
+    (proposal,) = _propose(columns).values()
+    assert proposal.entry == {"from": name.format("force", "x")}
+    assert (proposal.unit, proposal.is_doubtful, proposal.alternatives) == ("N", False, ())
+
+
 @pytest.mark.parametrize(
     ("name", "channel"),
     [  # in the manner of other people's loggers, some from public code, some made up; the rules were repaired by them

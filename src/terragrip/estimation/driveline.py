@@ -18,7 +18,6 @@ from terragrip.estimation.engine_torque import (
     DrivelineTorque,
     EngineTorque,
     driveline_torque,
-    has_engine_torque,
 )
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.rims import DRIVE, Rim, rims_of, speeds_alone
@@ -26,6 +25,7 @@ from terragrip.estimation.settings import wheel_radii
 from terragrip.estimation.slip_only import SlipReference
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
+from terragrip.recording.schema import has_engine_torque
 from terragrip.vehicle import Vehicle
 
 DRIVEN, UNDRIVEN = "driven", "undriven"

@@ -26,12 +26,6 @@ _SLOWEST = 0.07  # of √(g r): slower rims do not determine the ratio
 SHARE_STD = 0.02
 """SD of a controller's torque, which is a model's, of the reference torque."""
 _FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not state it (ours)
-_TORQUES = ("engine_torque", "engine_torque_share")
-
-
-def has_engine_torque(channels: Collection[str]) -> bool:
-    """Whether a log's channels hold the engine's speed and torque."""
-    return "engine_speed" in channels and any(name in channels for name in _TORQUES)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,9 @@ _KINDS = {
 }  # fmt: skip
 _MISSPELT = re.compile(r"ms(\^?-?2|²|\^?-1|⁻[¹²])")  # m/s^2 or m/s, which read as powers of milliseconds
 ON_THE_BUS = "a signal of J1939, ISO 11783 or NMEA 2000"
-_ROS = re.compile(r"\.(twist|linear|angular|angular_velocity|linear_acceleration|velocity|effort)(\.|\d|$)")
+_ROS = re.compile(
+    r"\.(twist|linear|angular|angular_velocity|linear_acceleration|velocity|effort|wrench)(\.|\d|$)"
+)
 
 
 @dataclass(frozen=True)
@@ -220,7 +222,7 @@ def _of_place(column: Column) -> list[Hint]:
     ):
         return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
     words = set(name.words)
-    if name.has("current"):
+    if name.has("current", "torque", "lateral", "vertical") or name.axis in ("y", "z"):
         return []
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in words)):
         return [("drawbar_force", 0.85, "a pull")]
@@ -331,6 +333,8 @@ def _unit_of_ros(column: str) -> str | None:
         return "m/s^2"
     if re.search(r"(angular_velocity|angular)\.[xyz]$", column):
         return "rad/s"
+    if re.search(r"wrench\.force\.[xyz]$", column):
+        return "N"
     if re.search(r"twist\.linear\.[xyz]$", column):
         return "m/s"
     end = r"(\d|\.|$)" if "joint" in column else r"(\d|\.)"

@@ -24,6 +24,7 @@ _LARGEST = {
     "deg": 180.001,
 }
 _STEEP = 0.8  # rad: no vehicle leans or climbs so for long
+_CONSTANTS = ("engine_friction_share", "engine_reference_torque")  # an engine's own, which hardly change
 _STANDING = 0.5  # m/s, under which wheels may stand still throughout
 
 
@@ -83,7 +84,7 @@ class Judge:
         column = self._columns[candidate.column]
         values = self._numbers[candidate.column]
         known = values[np.isfinite(values)]
-        own = candidate.score == 1.0
+        own = candidate.score == 1.0 or candidate.channel in _CONSTANTS
         if not len(known) or (
             not own
             and len(known) > 2

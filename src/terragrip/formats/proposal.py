@@ -12,7 +12,7 @@ import yaml
 from terragrip.formats.recognition import Proposal
 from terragrip.formats.time_column import TimeColumn
 from terragrip.recording import Recording
-from terragrip.recording.schema import has_torque, wheel_names_in
+from terragrip.recording.schema import has_engine_torque, has_torque, wheel_names_in
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
@@ -41,6 +41,13 @@ def missing_channels(
     if not wheels and "wheel_based_speed" not in proposals:
         return notes  # nothing else matters
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
+    if len(without) == len(wheels) and has_engine_torque(proposals):
+        if vehicle is None or vehicle.driveline is None:
+            notes.append(
+                "No wheel's drive torque was found, but the engine's: with a 'driveline' in the vehicle file the adhesion of all driven "
+                "wheels together can be estimated, without it slip alone."
+            )
+        return notes
     if len(without) == len(wheels):
         notes.append(
             "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, "

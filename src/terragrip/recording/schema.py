@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 TIME = "time"
 WHEEL_CHANNELS = {"wheel_speed": "rad/s", "drive_torque": "N m", "wheel_force_x": "N", "wheel_force_z": "N"}
@@ -56,6 +56,11 @@ def is_own(name: str) -> bool:
 def has_torque(names: Iterable[str]) -> bool:
     """Whether any of the columns is a wheel's drive torque; without one, only slip can be determined."""
     return any(name.startswith("drive_torque_") for name in names)
+
+
+def has_engine_torque(names: Collection[str]) -> bool:
+    """Whether the engine's speed and torque are among the columns."""
+    return "engine_speed" in names and not {"engine_torque", "engine_torque_share"}.isdisjoint(names)
 
 
 def unit_of(name: str) -> str | None:
