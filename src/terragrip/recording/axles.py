@@ -1,7 +1,8 @@
 """The axles' thrusts against their loads: sentences for the user, never errors.
 
-Wheels at one slip on one ground share an adhesion, so axles pull in proportion to their loads. Masses of two axles that are exchanged in
-the vehicle file, or exchanged torques, show as the square of the masses' ratio.
+Wheels on one ground share a curve of adhesion over slip, which rises ever less steeply: the axle that slips more pulls for its load at
+least as much as the other, and at most as many times as much as it slips. Masses of two axles that are exchanged in the vehicle file, or
+exchanged torques, show as the square of the masses' ratio.
 """
 
 from __future__ import annotations
@@ -28,13 +29,12 @@ _PULLING = 0.5  # of the thrust that a twentieth of the windows exceed
 _STRAIGHT = 0.05  # of an axle's rims from side to side
 _SLIP = 0.02  # less is of the size of the radii's errors,
 _RADII = 0.01  # which are a like share of the slip, and so of the adhesion
-_ALIKE = 0.3  # of the slip: its difference between the axles
 _UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' trodden track
 _RESTORED = 0.4  # of the difference, at most, is left when the masses are exchanged
 
 
 def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
-    """A sentence on two driven axles whose thrusts, at like slip, would be in proportion to each other's masses.
+    """A sentence on two driven axles whose thrusts, by their slips, would fit each other's masses.
 
     Other errors of torques and speeds look the same: use this only where no other was found.
     """
@@ -54,23 +54,42 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         return []
     pulls = _pulls(recording, vehicle, means, total)
     for a, b in combinations(driven, 2):
-        mean = median((slip[a] + slip[b])[rows]) / 2
-        if mean < _SLIP or abs(median((slip[a] - slip[b])[rows])) > _ALIKE * mean:
+        slips = [median(slip[k][rows]) for k in (a, b)]
+        if min(slips) < _SLIP:
             continue
+        steepest = float(np.log(slips[0] / slips[1]))
+        moved = {**thrust, a: thrust[b], b: thrust[a]}
         exchanged = vehicle.axle_mass.copy()
         exchanged[[a, b]] = exchanged[[b, a]]
-        off, left = (
-            [_difference(thrust, vehicle, masses, means, pull, rows, (a, b)) for pull in pulls]
-            for masses in (vehicle.axle_mass, exchanged)
-        )
-        least, uneven = min(off, key=abs), _UNEVEN + _RADII / mean
-        if min(off) * max(off) > 0 and abs(least) > uneven and min(map(abs, left)) < _RESTORED * abs(least):
+
+        def beyond(
+            forces: dict[int, Floats], masses: Floats, slope: float, pair: tuple[int, int]
+        ) -> list[float]:
+            of = [_difference(forces, vehicle, masses, means, pull, rows, pair) for pull in pulls]
+            return [_beyond(one, slope) for one in of]
+
+        off = beyond(thrust, vehicle.axle_mass, steepest, (a, b))
+        least, uneven = min(off, key=abs), _UNEVEN + _RADII / min(slips)
+        if min(off) * max(off) <= 0 or abs(least) <= uneven:
+            continue
+        causes = {
+            "the masses of the axles": beyond(thrust, exchanged, steepest, (a, b)),
+            "the axle of each torque": beyond(moved, vehicle.axle_mass, steepest, (a, b)),
+            "the axle of each wheel": beyond(moved, vehicle.axle_mass, -steepest, (a, b)),
+        }
+        likely = [what for what, left in causes.items() if min(map(abs, left)) < _RESTORED * abs(least)]
+        if likely:
             strong, weak = (names[a], names[b]) if least > 0 else (names[b], names[a])
             return [
-                f"At equal slip the axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as {weak}, and with exchanged "
-                "masses they would pull alike: check the masses of the axles, and the axle of each torque."
+                f"The axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as its slip and that of {weak} allow, and "
+                f"with the two exchanged it would not: check {', or '.join(likely)}."
             ]
     return []
+
+
+def _beyond(difference: float, steepest: float) -> float:
+    """What of a logarithm of two axles' thrusts over loads is beyond 0 and that of their slips (``steepest``), which a curve can give."""
+    return difference - float(np.clip(difference, min(steepest, 0.0), max(steepest, 0.0)))
 
 
 def _by_axle(
