@@ -172,7 +172,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
     if (course == TG_TURN) tgi_turn(e);
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
     if (course == TG_DRIFT) tgi_drift(e, dt);
-    else if (course == TG_REST) tgi_rest(e, drive);
+    else if (course == TG_REST) tgi_rest(e, drive, row->time);
     else if (course >= TG_START) sound = advance(e, row, drive, dt, q);
     tgi_believe(e);
     return sound;

@@ -3,6 +3,7 @@
 #define TG_ESTIMATOR_H
 #include "curve.h"
 #include "filter.h"
+#include "slip.h"
 #include <math.h>
 #include <string.h>
 
@@ -95,7 +96,7 @@ typedef struct { /* ground speed and slope error with their covariance */
 } tgi_slope;
 
 typedef struct { /* low-passed while the ground speed is measured; the whole vehicle */
-    tg_real slip, adhesion;
+    tg_real slip, adhesion, variance; /* of speeds alone, the slip's */
     tg_real usual, usual_adhesion; /* over the drive, */
     tg_real apart, way;            /* mean square of the slips about those, wheel radii that these cover */
     tg_real unseen;                /* wheel radii since a ground speed was measured */
@@ -268,6 +269,7 @@ TG_INLINE tg_real tgi_max(tg_real x, tg_real y) { return x > y ? x : y; }
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
+int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time);
 void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 
@@ -305,6 +307,8 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
 void tgi_no_slips(tg_estimator *e);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
+void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row);
+void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q);
 
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
@@ -343,7 +347,7 @@ void tgi_forget(tg_estimator *e);
 void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk);
 void tgi_unknown_adhesion(tg_estimator *e);
 void tgi_turn(tg_estimator *e);
-void tgi_rest(tg_estimator *e, const tg_drive *drive);
+void tgi_rest(tg_estimator *e, const tg_drive *drive, double time);
 void tgi_drift(tg_estimator *e, tg_real dt);
 
 /* algebraic.c */
@@ -372,28 +376,5 @@ size_t tgi_speeds_length(void);
 void tgi_speeds_smooth(const tg_settings *set, const tg_real *record, const tg_real *next, tg_real *carry, tg_real *o);
 
 /* traction.c */
-typedef struct { /* slip, and its change with omega, v and the relative radius */
-    tg_real slip, wheel, ground, radius;
-} tgi_slip;
-
-/* Speed of a hub that moves at `along` in the vehicle's direction and at `across` sideways; a steered wheel points along its path. */
-TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
-{
-    if (across == 0) return along;
-    const tg_real way = tgi_sqrt(along * along + across * across);
-    return along < 0 ? -way : way;
-}
-
-/* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
-TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
-{
-    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
-    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
-    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
-    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
-    const tgi_slip result = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
-    return result;
-}
-
 void tgi_traction(const tg_settings *s, const tg_real *warp, const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED], const tgi_scene *scene, tg_real *o);
 #endif

@@ -1,6 +1,8 @@
 /* What a raw sample is worth: calibration, impossible and held values; standstill and the direction of travel. */
 #include "estimator.h"
 
+#define TG_GROUND_AGE 1 /* s: an older ground speed says nothing of standstill */
+
 /* A held channel repeats its last value until the next measurement. A repetition counts as a measurement only after 1.5 periods, and
  * then only of an input (constant torque is common) or of 0 (standstill): a speed that stays the same to the last bit is a silent
  * sensor. */
@@ -78,9 +80,12 @@ tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
     return f->value;
 }
 
-static int32_t recent(const tg_lowpass *f, double time, tg_real age)
+/* Whether the speed of wheel `place`, or behind the wheels of the ground, was measured lately enough to say how the vehicle moves. */
+int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time)
 {
-    return f->seen && time - f->time <= (double)age;
+    const int32_t wheel = place < e->settings.machine.wheels;
+    const tg_lowpass *const f = wheel ? &e->wheel_speed[place] : &e->ground_speed;
+    return f->seen && time - f->time <= (wheel ? (double)e->settings.gap : TG_GROUND_AGE);
 }
 
 /* The yaw rate as last measured; after a second without it the vehicle is assumed to drive straight. */
@@ -134,11 +139,11 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
 }
 
 /* Low-passed speeds decide standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis
- * against noise. A ground speed that is a second old no longer counts. Returns 1 where the direction has changed. */
+ * against noise. Returns 1 where the direction has changed. */
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
-    const tg_real tau = s->tuned.settle, age = 1;
+    const tg_real tau = s->tuned.settle;
     settling pass = {tau, 0, 0};
     int32_t n = s->machine.wheels, seen = 0;
     const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
@@ -149,7 +154,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, &pass);
         const tg_real r = s->rolling_radius[i], noise = s->noise[TG_WHEEL_SPEED + i];
         const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
-        if (!recent(&e->wheel_speed[i], row->time, s->gap)) continue;
+        if (!tgi_is_recent(e, i, row->time)) continue;
         if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
         if (now > forward) forward = now;
         if (-now > backward) backward = -now;
@@ -158,7 +163,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         if (tgi_fabs(w) > fastest) fastest = tgi_fabs(w);
     }
     if (seen > 0) rim /= (tg_real)seen;
-    if (recent(&e->ground_speed, row->time, age)) {
+    if (tgi_is_recent(e, n, row->time)) {
         seen++;
         if (moves(e, ground, row->time)) over = tgi_fabs(ground);
     } else {

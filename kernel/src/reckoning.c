@@ -38,18 +38,16 @@ static tg_real slip_at(const tg_tuned *k, tg_real slip, tg_real from, tg_real ad
     return result < (tg_real)-0.2 ? (tg_real)-0.2 : result > (tg_real)0.8 ? (tg_real)0.8 : result;
 }
 
-/* After a row whose ground speed was measured: remember slip and adhesion. */
-void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
+/* A row whose ground speed v was measured, at the mean rim speed and adhesion; both along the travel. */
+static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, tg_real dt)
 {
+    const tg_tuned *const k = &e->settings.tuned;
     tgi_slip_memory *m = &e->slip_memory;
-    tg_real rim, adhesion, v = e->belief.x[e->settings.machine.wheels + 1];
-    means(e, NULL, drive, &rim, &adhesion);
     if (rim < 3 * e->settings.standstill_speed) return;
-    tg_real slip = 1 - v / rim, gain = dt / (e->settings.tuned.slip_memory + dt);
+    tg_real slip = 1 - v / rim, gain = dt / (k->slip_memory + dt);
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
     m->slip += gain * (slip - m->slip);
     m->adhesion += gain * (adhesion - m->adhesion);
-    const tg_tuned *const k = &e->settings.tuned;
     const tg_real since = tgi_max(dt, e->ground.interval < e->settings.gap ? e->ground.interval : e->settings.gap);
     const tg_real travelled = rim * since / e->constants.mean_radius, away = slip - slip_at(k, m->usual, m->usual_adhesion, adhesion);
     m->way = m->way + travelled < k->hill_memory ? m->way + travelled : k->hill_memory;
@@ -59,31 +57,56 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     m->apart += share * (tgi_square(away) - m->apart);
 }
 
+/* After a row whose ground speed was measured: remember slip and adhesion. */
+void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
+{
+    tg_real rim, adhesion;
+    means(e, NULL, drive, &rim, &adhesion);
+    remember(e, rim, e->belief.x[e->settings.machine.wheels + 1], adhesion, dt);
+}
+
+/* Another dt without a ground speed: how likely it is the last slip still. */
+static tg_real go_unseen(tg_estimator *e, tg_real rim, tg_real dt)
+{
+    e->slip_memory.unseen += tgi_fabs(rim) * dt / e->constants.mean_radius;
+    return tgi_exp(-e->slip_memory.unseen / e->settings.tuned.uneven_memory);
+}
+
+/* Ground speed along the travel at these rims and adhesion, and its variance: `error` is that of the slip apart from what ground does to it. */
+static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real keep, tg_real error, tg_real *variance)
+{
+    const tg_tuned *const k = &e->settings.tuned;
+    const tgi_slip_memory *const m = &e->slip_memory;
+    const tg_real last = slip_at(k, m->slip, m->adhesion, adhesion), usual = slip_at(k, m->usual, m->usual_adhesion, adhesion);
+    *variance = tgi_square(rim) * (error + (1 - keep) * (m->apart + keep * tgi_square(last - usual)));
+    return rim * (1 - usual - keep * (last - usual));
+}
+
+/* Whether the row's ground speed is to be reckoned, after so many seconds of silence; if it is measured, the silence is over. */
+static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_real silence)
+{
+    e->scene.reckoned = 0;
+    if (!isnan(row->value[TG_GROUND_SPEED])) {
+        e->ground_time = row->time;
+        e->slip_memory.unseen = 0;
+        return 0;
+    }
+    return (tg_real)(row->time - e->ground_time) >= silence && row->measured && dt > 0;
+}
+
 /* Give the row a ground speed by dead reckoning where the sensor has been silent. Its error lasts for a while, which the variance allows
  * for: a white one would be averaged away. With an accelerometer it only corrects the speed that the accelerometer predicts. */
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q)
 {
     const tg_tuned *const k = &e->settings.tuned;
-    tgi_slip_memory *const m = &e->slip_memory;
     row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->doubt[e->settings.machine.wheels];
-    e->scene.reckoned = 0;
-    if (!isnan(row->value[TG_GROUND_SPEED])) {
-        e->ground_time = row->time;
-        m->unseen = 0;
-        return;
-    }
-    tg_real silence = (tg_real)(row->time - e->ground_time), rim, adhesion;
-    if (silence < k->silence || !row->measured || !(dt > 0)) return;
+    if (!is_missing(e, row, dt, k->silence)) return;
     if (e->standing && e->slope.running) tgi_slope_correct(&e->slope, 0, tgi_square(e->settings.standstill_speed) * (1 + 2 * k->alike / dt));
     if (!goes) return;
+    tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, rim, adhesion, variance;
     means(e, row, drive, &rim, &adhesion);
-    m->unseen += tgi_fabs(rim) * dt / e->constants.mean_radius;
-    const tg_real last = slip_at(k, m->slip, m->adhesion, adhesion), usual = slip_at(k, m->usual, m->usual_adhesion, adhesion);
-    const tg_real keep = tgi_exp(-m->unseen / k->uneven_memory); /* how likely it is the last slip still */
-    const tg_real spread = tgi_square(k->slip_spread) + (1 - keep) * (m->apart + keep * tgi_square(last - usual));
-    tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk;
-    tg_real speed = (tg_real)e->direction * rim * (1 - usual - keep * (last - usual));
-    tg_real variance = tgi_square(rim) * spread + tgi_square((tg_real)0.01);
+    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, go_unseen(e, rim, dt), tgi_square(k->slip_spread), &variance);
+    variance += tgi_square((tg_real)0.01);
     e->scene.reckoned = variance;
     if (e->slope.running) {
         tgi_slope_correct(&e->slope, speed, variance * (1 + 2 * alike / dt));
@@ -97,4 +120,42 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
     row->reckoned = 1;
     const tg_real change = e->slope.running ? 0 : k->agility * e->settings.machine.gravity * dt; /* any acceleration up to half of that */
     q[e->settings.machine.wheels] += force * dt + tgi_square(change) / 12;
+}
+
+/* Mean rim speed along the travel, of this row where it measures it, for speeds alone. */
+static tg_real rim_of_speeds(const tg_estimator *e, const tg_row *row)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real sum = 0;
+    for (int32_t i = 0; i < n; i++) {
+        const tg_real omega = row->value[TG_WHEEL_SPEED + i];
+        sum += isnan(omega) ? e->speeds.x[0] + e->speeds.x[2 + i] : e->settings.rolling_radius[i] * omega;
+    }
+    return (tg_real)e->direction * sum / (tg_real)n;
+}
+
+/* The same for speeds alone, where the slip is that of one adhesion, and which need no help between the samples of a slow receiver. A
+ * vehicle that stands has no speed. */
+void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
+{
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED];
+    const tg_real usual = 2 * e->ground.interval, most = e->settings.gap, silence = tgi_max(e->settings.tuned.silence, usual < most ? usual : most);
+    if (!is_missing(e, row, dt, silence) || e->speeds.seen[0] == 0 || e->speeds.open != 0) return;
+    tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;
+    if (!e->standing) {
+        const tg_real rim = rim_of_speeds(e, row), keep = go_unseen(e, rim, dt), error = tgi_square(keep) * e->slip_memory.variance;
+        speed = (tg_real)e->direction * reckoned_at(e, rim, e->settings.prior_adhesion, keep, error, &variance);
+    }
+    e->scene.reckoned = variance;
+    row->value[TG_GROUND_SPEED] = speed;
+    row->ground_variance = variance;
+    row->reckoned = 1;
+}
+
+void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt)
+{
+    const tg_real rim = rim_of_speeds(e, row);
+    if (row->reckoned || isnan(row->value[TG_GROUND_SPEED])) return;
+    remember(e, rim, (tg_real)e->direction * e->speeds.x[0], e->settings.prior_adhesion, dt);
+    e->slip_memory.variance = e->speeds.P[0][0] / tgi_square(tgi_max(tgi_fabs(rim), 3 * e->settings.standstill_speed));
 }

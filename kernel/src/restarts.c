@@ -43,7 +43,7 @@ void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
         rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
         seen++;
     }
-    int32_t late = isnan(v) && e->ground_speed.seen && row->time - e->ground_speed.time <= 1;
+    int32_t late = isnan(v) && tgi_is_recent(e, n, row->time);
     if (late) v = e->ground_speed.value;
     else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
     tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
@@ -85,19 +85,18 @@ void tgi_turn(tg_estimator *e)
     tgi_place_adhesion(&e->filter, mu);
 }
 
-/* At standstill the low-passed speeds are the outputs. Adhesion is held; before the first motion there is none to hold, and it follows
- * from the torques, as uncertain as the prior. */
-void tgi_rest(tg_estimator *e, const tg_drive *drive)
+/* At standstill the low-passed speeds are the outputs; one that is no longer measured is that of a vehicle that stands. Adhesion is held;
+ * before the first motion there is none to hold, and it follows from the torques, as uncertain as the prior. */
+void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
     tg_real d = (tg_real)e->direction, x[9], P[9];
-    for (int32_t i = 0; i < n; i++) {
-        x[i] = d * e->wheel_speed[i].value;
-        P[i] = tgi_square(s->noise[TG_WHEEL_SPEED + i]);
+    for (int32_t j = 0; j <= n; j++) {
+        const int32_t fresh = tgi_is_recent(e, j, time);
+        x[j] = fresh ? d * (j < n ? e->wheel_speed[j].value : e->ground_speed.value) : 0;
+        P[j] = tgi_square(fresh ? s->noise[j < n ? TG_WHEEL_SPEED + j : TG_GROUND_SPEED] : s->standstill_speed / (j < n ? s->rolling_radius[j] : 1));
     }
-    x[n] = d * e->ground_speed.value;
-    P[n] = tgi_square(s->noise[TG_GROUND_SPEED]);
     restart(e, 0, x, P);
     if (e->distance > 0) return;
     tg_real mu[TG_MAX_WHEELS];

@@ -38,6 +38,14 @@ static void disturb(const tg_tuned *k, const tg_real *x, tg_real (*P)[SIZE], tg_
     }
 }
 
+/* What separates ground speed and slip speeds is reckoned: between them goes any acceleration, up to half of that, and no rim shows it. */
+static void loosen(tg_real (*P)[SIZE], tg_real change, int32_t n)
+{
+    const tg_real added = tgi_square(change) / 12;
+    for (int32_t i = -1; i < n; i++)
+        for (int32_t j = -1; j < n; j++) P[i < 0 ? 0 : 2 + i][j < 0 ? 0 : 2 + j] += (i < 0) == (j < 0) ? added : -added;
+}
+
 /* P becomes F P F' of a step: F differs from 1 in v' = v + reach a, a' = keep a. */
 static void carry_on(tg_real (*P)[SIZE], tg_real reach, tg_real keep, int32_t size)
 {
@@ -138,7 +146,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     move(scale, reach, keep);
     const tg_real side = in->y[0] > scale[0] ? 1 : -1;
     tg_real ahead = 0, square = 0; /* innovation of the ground speed by all modes, and its mean square */
-    in->confirmed = !isnan(in->y[0]) && s->off == side;
+    in->confirmed = !isnan(in->y[0]) && !row->reckoned && s->off == side;
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         tgi_speed_mode *const mode = &e->speed_mode[m];
         const tg_real prior = stay * s->probability[m] + leave;
@@ -146,6 +154,7 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
         move(mode->x, reach, keep);
         carry_on(mode->P, reach, keep, size);
         disturb(tuned, scale, mode->P, dt, tuned->manoeuvre[m / TG_LEVELS], tuned->slipping[m % TG_LEVELS], n);
+        if (row->reckoned) loosen(mode->P, tuned->agility * e->settings.machine.gravity * dt, n);
         const tg_real innovation = in->y[0] - mode->x[0];
         ahead += prior * innovation;
         square += prior * (tgi_square(innovation) + mode->P[0][0]);
@@ -156,11 +165,12 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     tgi_watch_innovation(e, row, ahead, square - tgi_square(ahead) + in->variance[0]);
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) sum += s->probability[m] = tgi_exp(fit[m].score - best);
     s->manoeuvre = s->slipping = 0;
+    const int32_t measured = row->reckoned ? 1 : 0; /* the first of them: the ground speed comes first, and a reckoned one is no measurement */
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         const tg_real p = s->probability[m] /= sum;
         s->manoeuvre += p * tuned->manoeuvre[m / TG_LEVELS];
         s->slipping += p * tuned->slipping[m % TG_LEVELS];
-        for (int32_t k = 0; k < in->count; k++) {
+        for (int32_t k = measured; k < in->count; k++) {
             const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed is first here, after the wheels elsewhere */
             if (m == 0) row->channel_nis[place] = 0;
             row->channel_nis[place] += p * fit[m].nis[c];
@@ -168,8 +178,8 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
             weight[k] += p * fit[m].weight[c];
         }
     }
-    for (int32_t k = 0; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
-    if (!isnan(in->y[0])) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0; /* the ground speed comes first */
+    for (int32_t k = measured; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
+    if (!isnan(in->y[0]) && !measured) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0;
     merge(s, e->speed_mode, size);
 }
 
@@ -239,7 +249,7 @@ static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speed
     const tg_real ground = s->begun != 0 || isnan(row->value[TG_GROUND_SPEED]) ? s->x[0] : row->value[TG_GROUND_SPEED];
     in->count = 0;
     in->y[0] = row->value[TG_GROUND_SPEED];
-    in->variance[0] = e->constants.variance[TG_GROUND_SPEED];
+    in->variance[0] = row->ground_variance;
     for (int32_t i = 0; i < n; i++) {
         const tg_real r = set->rolling_radius[i], side = set->wheel_side[i], along = ground - side * s->yaw;
         in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw - (tgi_hub_of(along, set->wheel_ahead[i] * s->yaw) - along);
@@ -275,14 +285,18 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     s->standing = (tg_real)e->standing;
     const int32_t blind = rims_are_blind(e, row, &any);
     if (any || e->standing) s->open = (tg_real)blind;
-    samples_of(e, row, s, &in);
     if (e->standing) tgi_rest_reading(e, row);
     else tgi_rest_over(e);
+    if (!e->started) e->ground_time = row->time;
+    tgi_hold_update(&e->ground, &e->settings, row->value[TG_GROUND_SPEED], row->time, 0, e->settings.noise[TG_GROUND_SPEED], 0, !e->standing);
+    tgi_reckon_speeds(e, dt, row);
+    samples_of(e, row, s, &in);
     e->belief.nis = 0;
     if (s->begun != 0) step(e, dt, &in, row);
     else begin(e, &in, n);
-    e->belief.channels = in.count;
-    for (int32_t k = 0; k < in.count; k++) s->seen[in.given[k]] = 1;
+    e->belief.channels = in.count - row->reckoned;
+    for (int32_t k = row->reckoned; k < in.count; k++) s->seen[in.given[k]] = 1;
+    if (!gap && !e->standing) tgi_remember_speeds(e, row, dt);
     if (!gap && !e->standing) e->distance += (double)((travelled + tgi_fabs(s->x[0])) / 2 * dt);
     if (row->measured) {
         e->seen_motion = 1;
@@ -292,7 +306,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->started = 1;
     e->time = row->time;
 
-    s->slow = tgi_slow_variance(e) + tgi_alike_variance(e);
+    s->slow = tgi_slow_variance(e) + tgi_alike_variance(e) + tgi_max(e->scene.reckoned - s->P[0][0], 0);
     tgi_speeds_report(&e->settings, s, out->value);
     out->time = row->time;
     out->distance = e->distance;
@@ -304,7 +318,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]) + s->slow;
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
     const int32_t watched = tgi_watched(e);
-    out->event = (gap && !first) || open    ? TG_EVENT_GAP
+    out->event = (gap && !first) || open || tgi_ground_is_silent(e, row->time) ? TG_EVENT_GAP
                : e->standing                ? TG_EVENT_STANDSTILL
                : watched != TG_EVENT_NONE   ? watched
                : row->outlier               ? TG_EVENT_OUTLIER

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.estimation.drives import WHEELS, Drive, drive, robot
+from tests.estimation.drives import RADIUS, WHEELS, Drive, drive, robot
 
 from terragrip.estimation import Estimates, estimate
 from terragrip.ground.events import events
@@ -50,6 +50,20 @@ def test_intervals_hold_and_are_no_wider_than_soils_differ(rate: float, imu: boo
     assert held(estimates, made, rows, "slip_fl") > 0.92
     assert held(estimates, made, rows, "adhesion_fl") > 0.92
     assert np.mean(estimates["slip_fl_std"][rows]) < 3 * np.std(made.truth["slip_fl"])
+
+
+@pytest.mark.parametrize("speed", [lambda t: 0.6 + 0.05 * np.sin(t / 3), stops])
+@pytest.mark.parametrize("rate", [5.0, 50.0])
+def test_without_torques_as_well(rate: float, speed: Any) -> None:
+    """Held in 0 to 93 % of rows, without a word, while each wheel's slip speed was assumed to stay as it was."""
+    made = drive(140.0, rate=rate, slip=soils, speed=speed)
+    channels = {name: v for name, v in made.recording.channels.items() if "torque" not in name}
+    estimates, rows = lost(replace(made, recording=replace(made.recording, channels=channels)))
+    assert held(estimates, made, rows, "slip_fl") > 0.92
+    assert held(estimates, made, rows, "ground_speed") > 0.92
+    assert np.mean(estimates["slip_fl_std"][rows]) < 4 * np.std(made.truth["slip_fl"])
+    silent = (made.recording.time > LOST + 4) & (made.recording.time < BACK)
+    assert np.isin(estimates["event"][silent], ["gap", "standstill"]).all()
 
 
 @pytest.mark.parametrize("imu", [True, False])
@@ -156,3 +170,21 @@ def test_a_stop_meanwhile_is_a_standstill() -> None:
     phase, time = made.recording.time % 20, made.recording.time
     stands = (time > LOST + 3) & (time < BACK) & (phase > 14) & (phase < 19)
     assert np.mean(estimates["event"][stands] == "standstill") > 0.95
+
+
+@pytest.mark.parametrize("torques", [True, False])
+@pytest.mark.parametrize("lost_channel", ["ground_speed", "wheel_speed_fl"])
+def test_a_sensor_lost_while_driving_does_not_drive_a_vehicle_that_stands(
+    lost_channel: str, torques: bool
+) -> None:
+    """From 9 s on nothing is measured of it; the stop begins at 12 s and lasts 8 s. Its last value was that of a vehicle at speed."""
+    made = drive(40.0, rate=20.0, speed=stops)
+    time, channels = made.recording.time, dict(made.recording.channels)
+    channels[lost_channel] = np.where((time > 9) & (time < 30), np.nan, channels[lost_channel])
+    kept = {name: values for name, values in channels.items() if torques or "torque" not in name}
+    estimates = estimate(replace(made.recording, channels=kept), robot())
+    stands = (time > 14) & (time < 19.5)
+    for name in ("ground_speed", "wheel_speed_fl"):
+        error, spread = np.abs(estimates[name][stands]), estimates[f"{name}_std"][stands]
+        assert np.max(error) * (1.0 if name == "ground_speed" else RADIUS) < 0.1, name
+        assert np.mean(error < 1.96 * spread) > 0.92, name

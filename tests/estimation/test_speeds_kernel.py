@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import terragrip as tg
+from kernel_twin.reckoning import Reckoning
 from kernel_twin.speeds import SpeedsFilter, process_noise, transition
+from terragrip.units import STANDARD_GRAVITY
 
 RADIUS = 0.25
 
@@ -27,6 +29,7 @@ def drive(wheels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     speeds[150:] += 1.0
     speeds[draws.random(speeds.shape) < 0.3] = np.nan
     speeds[[50, 90, 130], 0] = 15.0
+    speeds[180:210, 0] = np.nan
     return time, speeds
 
 
@@ -41,19 +44,22 @@ def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
     estimates = tg.estimate(log, machine(names), **options)
     smooth = tg.estimate(log, machine(names), smooth=True, **options)
 
-    twin = SpeedsFilter(np.r_[0.03, np.full(wheels, 0.02)])
-    states, covariances, densities, scores, slow = [], [], [], [], []
+    reckoning = Reckoning(RADIUS, 0.01 * np.sqrt(STANDARD_GRAVITY * RADIUS), gap=1e3)
+    twin = SpeedsFilter(np.r_[0.03, np.full(wheels, 0.02)], reckoning)
+    states, covariances, densities, scores, slow, silent = [], [], [], [], [], 0
     for k in range(len(time)):
         twin.step(time[k] - time[k - 1] if k else 0.0, speeds[k])
         states.append(twin.state.copy())
         covariances.append(twin.covariance.copy())
         densities.append(twin.densities)
         slow.append(twin.slow)
+        silent += twin.reckoned > 0
         scores.append((twin.nis, twin.weight.min()))
     score = np.array(scores)
     assert np.allclose(estimates["nis"], score[:, 0], rtol=1e-9, atol=1e-9)
     assert np.array_equal(estimates["event"] == "outlier", score[:, 1] < 0.5)
     assert np.sum(score[:, 1] < 0.5) >= 3
+    assert silent > 20
     _same(estimates, states, covariances, slow, names)
     for k in range(len(time) - 2, -1, -1):  # Rauch, Tung and Striebel
         dt = time[k + 1] - time[k]

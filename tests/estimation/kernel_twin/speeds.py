@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from kernel_twin.reckoning import Reckoning
+
 Floats = npt.NDArray[np.float64]
 
 MANOEUVRES = (1e-3, 3e-2, 1.0)
@@ -27,6 +29,7 @@ HUBER = 4.0
 OUTLIER = 0.5
 """A sample that counts less than this is an outlier."""
 _FIRST_RATE = 1.0  # SD of a [m/s²] before it was seen
+_AGILITY = 0.5 * 9.80665  # m/s²: what a vehicle is capable of
 _SLOWEST = 0.1  # m/s: slower wheels change their slip speed no less
 TOGETHER = 0.9
 """Correlation of what two wheels' slip speeds change by: they stand on one ground and pull one load."""
@@ -57,12 +60,17 @@ class SpeedsFilter:
     pairs: int = field(init=False, default=0)
     last: float = field(init=False, default=0.0)
     expected: float = field(init=False, default=0.0)
+    reckoning: Reckoning | None = None
+    """Of a silent ground speed; None: never."""
+    reckoned: float = field(init=False, default=0.0)
+    """Variance of this row's reckoned ground speed, else 0."""
 
     @property
     def slow(self) -> float:
-        """Variance of the ground speed's error that does not average out; no stop has shown it."""
+        """Variance of the ground speed beside the covariance: of an error that no stop has shown, and of a reckoned one."""
         chance = SURE * self.expected / np.sqrt(self.pairs) if self.pairs else 0.0
-        return (SLOW_SHARE * self.noise[0]) ** 2 + (max(self.alike - chance, 0.0) if self.alike > 0 else 0.0)
+        alike = max(self.alike - chance, 0.0) if self.alike > 0 else 0.0
+        return (SLOW_SHARE * self.noise[0]) ** 2 + alike + max(self.reckoned - self.covariance[0, 0], 0.0)
 
     def __post_init__(self) -> None:
         size = len(self.noise) + 1
@@ -74,7 +82,12 @@ class SpeedsFilter:
 
     def step(self, dt: float, speeds: Floats) -> None:
         """Go ``dt`` [s] on and take samples (1 + wheels,) [m/s] of ground speed and rims, NaN where not measured."""
-        self.nis, self.channels, self.weight = 0.0, 0, np.ones(len(self.noise))
+        self.nis, self.channels, self.weight, self.reckoned = 0.0, 0, np.ones(len(self.noise)), 0.0
+        measured, noise = bool(np.isfinite(speeds[0])), self.noise.copy()
+        if self.reckoning and (made := self.reckoning.speed(dt, speeds, self.state[0] + self.state[2:])):
+            self.reckoned = made[1]
+            speeds = np.r_[made[0], speeds[1:]]
+            noise[0] = np.sqrt(made[1])
         if not self.begun:
             self._begin(speeds)
             return
@@ -84,16 +97,20 @@ class SpeedsFilter:
         stay, leave = np.exp(-dt / DWELL), -np.expm1(-dt / DWELL) / len(PAIRS)
         prior = stay * self.probability + leave
         side = 1.0 if speeds[0] > scale[0] else -1.0
-        confirmed = bool(usable[0]) and self.off == side
+        confirmed = measured and self.off == side
         result, ahead, square = [], 0.0, 0.0
         for m, (manoeuvre, slipping) in enumerate(PAIRS):
             x, P = self._mixed(m, stay * self.probability[m] / prior[m])
             Q = process_noise(scale, dt, manoeuvre, slipping**2)
             x, P = move @ x, move @ P @ move.T + Q
+            if self.reckoned:
+                P = P + (_AGILITY * dt) ** 2 / 12 * _between(len(x))
             ahead += prior[m] * (speeds[0] - x[0])
             square += prior[m] * ((speeds[0] - x[0]) ** 2 + P[0, 0])
-            result.append(self._update(x, P, speeds, usable, confirmed))
-        if usable[0]:
+            result.append(self._update(x, P, speeds, noise, confirmed))
+        if self.reckoned:
+            self.last = 0.0
+        elif measured:
             self._watch(ahead, square - ahead**2 + self.noise[0] ** 2)
         score = np.log(prior) + [one[2] for one in result]
         p = np.exp(score - score.max())
@@ -102,11 +119,14 @@ class SpeedsFilter:
         self.means, self.spreads = np.stack([one[0] for one in result]), np.stack([one[1] for one in result])
         self.nis = float(p @ [one[3] for one in result])
         self.weight = p @ np.stack([one[4] for one in result])
-        if usable[0]:
+        if measured:
             self.off = side if confirmed or self.weight[0] < OUTLIER else 0.0
-        self.channels = int(usable.sum())
+        self.channels = int(usable.sum()) - (self.reckoned > 0)
         self.densities = float(p @ [q for q, _ in PAIRS]), float(p @ [c * c for _, c in PAIRS])
         self._merge()
+        if self.reckoning and measured:
+            v, rims = self.state[0], self.state[0] + self.state[2:]
+            self.reckoning.remember(dt, v, self.covariance[0, 0], speeds, rims)
 
     def _watch(self, innovation: float, variance: float) -> None:
         """Take one more innovation of the ground speed."""
@@ -131,24 +151,27 @@ class SpeedsFilter:
         self.covariance += np.einsum("m,mi,mj->ij", self.probability, apart, apart)
 
     def _update(
-        self, x: Floats, P: Floats, speeds: Floats, usable: npt.NDArray[np.bool_], confirmed: bool
+        self, x: Floats, P: Floats, speeds: Floats, noise: Floats, confirmed: bool
     ) -> tuple[Floats, Floats, float, float, Floats]:
         likelihood, nis = 0.0, 0.0
+        usable = np.isfinite(speeds)
         rows = _rows(len(self.noise))
         weight = np.ones(len(self.noise))
         for c in np.flatnonzero(usable):
-            size = np.sqrt(rows[c] @ P @ rows[c] + self.noise[c] ** 2)
+            size = np.sqrt(rows[c] @ P @ rows[c] + noise[c] ** 2)
             off = abs(speeds[c] - rows[c] @ x)
             soft = off > HUBER * size and not (c == 0 and confirmed)
             weight[c] = HUBER * size / off if soft else 1.0
         for c in np.flatnonzero(usable):
             column = P @ rows[c]
-            variance = rows[c] @ column + self.noise[c] ** 2 / weight[c]
+            variance = rows[c] @ column + noise[c] ** 2 / weight[c]
             innovation = speeds[c] - rows[c] @ x
             x = x + column * innovation / variance
             P = P - np.outer(column, column) / variance
-            nis += innovation**2 / variance
+            nis += 0.0 if c == 0 and self.reckoned else innovation**2 / variance
             likelihood -= 0.5 * (innovation**2 / variance + np.log(variance))
+        if self.reckoned:
+            weight[0] = 1.0
         return x, P, likelihood, nis, weight
 
     def _begin(self, speeds: Floats) -> None:
@@ -180,6 +203,13 @@ def transition(dt: float, size: int) -> Floats:
     move[0, 1] = -LASTING * np.expm1(-dt / LASTING)
     move[1, 1] = np.exp(-dt / LASTING)
     return move
+
+
+def _between(size: int) -> Floats:
+    """What moves the ground speed one way and all slip speeds the other, at constant rims."""
+    direction = np.full(size, -1.0)
+    direction[:2] = 1.0, 0.0
+    return np.outer(direction, direction)
 
 
 def process_noise(x: Floats, dt: float, manoeuvre: float, slipping: float) -> Floats:

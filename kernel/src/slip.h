@@ -1,0 +1,30 @@
+/* Slip of a wheel from its speed and its hub's. */
+#ifndef TG_SLIP_H
+#define TG_SLIP_H
+#include "model.h"
+#include <math.h>
+
+typedef struct { /* slip, and its change with omega, v and the relative radius */
+    tg_real slip, wheel, ground, radius;
+} tgi_slip;
+
+/* Speed of a hub that moves at `along` in the vehicle's direction and at `across` sideways; a steered wheel points along its path. */
+TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
+{
+    if (across == 0) return along;
+    const tg_real way = tgi_sqrt(along * along + across * across);
+    return along < 0 ? -way : way;
+}
+
+/* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
+TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
+{
+    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
+    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
+    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
+    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
+    const tgi_slip result = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
+    return result;
+}
+
+#endif
