@@ -112,6 +112,12 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
 } tgi_roughness;
 
+typedef struct { /* slips of the driven wheels in a row; 0 of others */
+    tg_real along[8], straight[8]; /* on each hub's own way, and as if the vehicle did not turn */
+    tg_real variance;              /* of one wheel's, by the errors of the wheels' speeds, in the mean */
+    int32_t known;                 /* else they show nothing */
+} tgi_slips;
+
 typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
     tg_real usual[8], slip[8]; /* wheel: slip beyond all trends as a rule, and beyond that low-passed over `slip_length` */
@@ -322,14 +328,14 @@ tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
 /* hidden.c */
-void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh);
+void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh);
 tg_real tgi_by_load(const tg_estimator *e, tg_real scatter);
 
 /* warp.c */
-int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance);
+tgi_slips tgi_driven_slips(const tg_estimator *e);
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
-void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain);
+void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain);
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 
 /* slow_speed.c */

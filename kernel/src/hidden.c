@@ -84,12 +84,13 @@ static void end_stretch(tg_estimator *e)
 
 /* After a row's estimate, `travelled` wheel radii behind the one before; `fresh`: its weight over the length of unevenness. `flowing`:
  * the row goes on from that one. */
-void tgi_watch_hidden(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh)
+void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh)
 {
     tgi_hidden *h = &e->hidden;
     const tg_real *const mu = e->belief.x, *const at_rest = e->constants.at_rest;
-    tg_real slip[TG_MAX_WHEELS] = {0}, variance, pull = 0, mean = 0;
-    if (!flowing || !tgi_slips(e, (tg_real)e->direction * e->yaw_rate, slip, &variance)) {
+    const tg_real *const slip = slips->along;
+    tg_real pull = 0, mean = 0;
+    if (!flowing || !slips->known) {
         memset(&h->now, 0, sizeof h->now);
         memset(h->last, 0, sizeof h->last);
         h->way = 0;

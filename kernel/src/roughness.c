@@ -66,8 +66,11 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         square /= (tg_real)driven;
         own /= (tg_real)driven;
     }
-    if (e->constants.warps) tgi_watch_warp(e, flowing, travelled, fresh, gain);
-    if (e->constants.slopes && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, flowing, travelled, fresh);
+    if (e->constants.warps || e->constants.slopes) {
+        const tgi_slips slips = tgi_driven_slips(e);
+        if (e->constants.warps) tgi_watch_warp(e, &slips, flowing, travelled, fresh, gain);
+        if (e->constants.slopes && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, &slips, flowing, travelled, fresh);
+    }
     const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
     count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);
     r->square += gain * (square - r->square);

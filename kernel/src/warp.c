@@ -71,25 +71,24 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
     lanes_store(warp + TG_LANES, last);
 }
 
-/* Slips of the driven wheels of a vehicle that turns at `yaw` rad/s, and the variance that the errors of the wheels' speeds give one of
- * them in the mean. Returns 0 where they show nothing. */
-int32_t tgi_slips(const tg_estimator *e, tg_real yaw, tg_real *slip, tg_real *variance)
+/* Slips of the driven wheels after a row's estimate. */
+tgi_slips tgi_driven_slips(const tg_estimator *e)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels, stride = tgi_stride(n);
-    const tg_real v = e->belief.x[n + 1], *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
-    int32_t fit = v > s->standstill_speed;
-    tg_real sum = 0;
+    const tg_real v = e->belief.x[n + 1], yaw = (tg_real)e->direction * e->yaw_rate, *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
+    tgi_slips slips = {{0}, {0}, 0, v > s->standstill_speed};
     for (int32_t i = 0; i < n; i++) {
         if (!(e->constants.pulls[i] > 0)) continue;
         const tg_real hub = tgi_hub_of(v - s->wheel_side[i] * yaw, s->wheel_ahead[i] * yaw);
-        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i];
-        slip[i] = 1 - part;
-        fit &= part > 0 && part < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)s->tuned.silence;
-        sum += tgi_square(part * inverse) * P[i * (stride + 1)];
+        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i], straight = v * inverse * e->constants.inverse_radius[i];
+        slips.along[i] = 1 - part;
+        slips.straight[i] = 1 - straight;
+        slips.known &= part > 0 && part < 2 && straight > 0 && straight < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)s->tuned.silence;
+        slips.variance += tgi_square(straight * inverse) * P[i * (stride + 1)];
     }
-    *variance = sum * e->constants.share;
-    return fit;
+    slips.variance *= e->constants.share;
+    return slips;
 }
 
 /* How far the driven wheels' rims go for each metre of the vehicle. */
@@ -116,13 +115,14 @@ static tg_real usual_slip(const tg_estimator *e, tg_real before)
     return place * mean / (1 - bend);
 }
 
-static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
+/* Slips as if the vehicle did not turn: what a turn does is a trend, and a gyroscope's noise is none. */
+static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travelled, tg_real gain)
 {
     tgi_warped *w = &e->warped;
     const tgi_constants *c = &e->constants;
-    tg_real slip[TG_MAX_WHEELS] = {0}, along[TG_MAX_WHEELS] = {0}, warp[TG_MAX_WHEELS], variance, square = 0, pull = 0, all = 0;
-    const int32_t fit = tgi_slips(e, (tg_real)e->direction * e->yaw_rate, along, &variance);
-    if (!tgi_slips(e, 0, slip, &variance) || !fit) { /* what a turn does is a trend, and a gyroscope's noise is none */
+    const tg_real *const slip = slips->straight;
+    tg_real warp[TG_MAX_WHEELS], square = 0, pull = 0, all = 0;
+    if (!slips->known) {
         memset(w->slip, 0, sizeof w->slip);
         return;
     }
@@ -130,7 +130,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
     const tg_real rolled = travelled * rims_way(e), soon = rolled / (e->settings.tuned.slip_length / 2 + rolled);
     const tg_real fresh = rolled / (e->settings.tuned.uneven_length + rolled); /* of the rims' distance: the vehicle covers none where wheels spin on the spot */
     tgi_warp(c, slip, warp);
-    const tg_real noise = variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
+    const tg_real noise = slips->variance * (tg_real)c->warps * c->share, most = e->settings.tuned.uneven_most * (w->noise + tgi_square(e->settings.tuned.small_slip));
     const tg_real weight = noise > most ? most / noise : 1; /* after a gap or a spike a row is less certain than usual */
     for (int i = 0; i < TG_MAX_WHEELS; i++) all += tgi_square(slip[i]) * c->share;
     const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* a spinning wheel's slip tells nothing of radii and ruts */
@@ -142,7 +142,7 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
         w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
         pull += c->at_rest[i] * e->belief.x[i];
-        w->each[i] += fresh * (along[i] - w->each[i]);
+        w->each[i] += fresh * (slips->along[i] - w->each[i]);
     }
     w->square += weight * gain * (square * c->share - w->square);
     w->noise += weight * gain * (noise - w->noise);
@@ -153,12 +153,12 @@ static void watch_slips(tg_estimator *e, tg_real travelled, tg_real gain)
 
 /* After a row's estimate, `travelled` wheel radii behind the one before; `fresh` and `gain`: its weights over the length and the memory of
  * unevenness. `flowing`: the row continues that one; else its adhesions may be anything, and what lasted before stays. */
-void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
+void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
 {
     tgi_warped *w = &e->warped;
     tgi_warp(&e->constants, e->belief.x, w->now);
     for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
-    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, travelled, gain);
+    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, slips, travelled, gain);
     else memset(w->slip, 0, sizeof w->slip);
 }
 
