@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from tests.estimation.test_rim_parts import RIMS, TIME, log_of
 from tests.estimation.turning_log import TRACK, machine, turning_log
 
 import terragrip as tg
+from terragrip.arrays import Bools, Floats
 from terragrip.estimation.turning import _unseen_turns, turn_in
 from terragrip.recording import LogBlocks, Recording
 
@@ -49,6 +51,16 @@ def test_blocks_tell_the_turn_of_the_whole_log() -> None:
 def test_a_gyroscope_is_not_replaced() -> None:
     log = turning_log(3, seconds=60.0).with_channels(angular_velocity_z=np.zeros(600))
     assert turn_in(LogBlocks.of(log), log, machine()) == (None, [])
+
+
+@pytest.mark.parametrize(("measured", "said"), [(lambda t: t < 60, True), (lambda t: t % 3 < 2, False)])
+def test_a_gyroscope_that_falls_silent_is_said(measured: Callable[[Floats], Bools], said: bool) -> None:
+    """The slips of inner and outer wheel were .2 off in every turn behind it, without a word; a second's silence hardly counts."""
+    log = turning_log(3, seconds=160.0)
+    turn = np.where(log.time % 40 > 30, np.pi / 10, 0.0) * np.where(log.time % 80 > 40, 1, -1)
+    turn = np.where(measured(log.time), np.convolve(turn, np.ones(10) / 10, "same"), np.nan)
+    estimates = tg.estimate(without(log, *POSITIONS).with_channels(angular_velocity_z=turn), machine())
+    assert any("no signal shows how fast the machine turned" in note for note in estimates.notes) is said
 
 
 @pytest.mark.parametrize(

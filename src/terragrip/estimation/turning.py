@@ -1,4 +1,4 @@
-"""The yaw rate of a log without a sensor for it: a wheel's slip is relative to its hub's speed, which depends on the turn."""
+"""The yaw rate of a log whose sensor is missing or falls silent: a wheel's slip is relative to its hub's speed, which depends on the turn."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
 
+YAW_RATE = "angular_velocity_z"
 _CALM = 4.0  # s over which a yaw rate is taken from positions
 _MOVING = 0.1  # m/s
 _WINDOW = 2.0  # s
@@ -28,8 +29,10 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track 
     """
     channels = sample.channels
     rims = rims_of(vehicle, channels)
-    if "angular_velocity_z" in channels or not any(rim.side or rim.ahead for rim in rims):
+    if not any(rim.side or rim.ahead for rim in rims):
         return None, []
+    if YAW_RATE in channels:
+        return None, _unseen_turns(sample, rims) if _falls_silent(sample) else []
     track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
     if track is not None and np.isfinite(track.turn).any():
         return track, ["The rate of turn is that of the positions."]
@@ -44,21 +47,29 @@ def _positions(log: LogBlocks) -> Recording:
     return Recording(time, dict(zip(names, columns, strict=True)))
 
 
+def _falls_silent(log: Recording) -> bool:
+    """Whether the yaw rate is missing for longer than a window: after a second the estimator takes the drive for straight."""
+    measured = log.time[np.isfinite(log.channels[YAW_RATE])]
+    return bool(np.any(np.diff(np.r_[log.time[:1], measured, log.time[-1:]]) > _WINDOW))
+
+
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     """A sentence on a rate of turn that is missing."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
-    speeds = {rim.channel: log.channels[rim.channel] for rim in rims}
+    names = [*(rim.channel for rim in rims), *([YAW_RATE] if YAW_RATE in log.channels else [])]
+    speeds = {name: log.channels[name] for name in names}
     calm = averaged(replace(log, channels=speeds, labels={}), _WINDOW).channels
     left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], calm) for sign in (1, -1))
     with np.errstate(invalid="ignore"):
         mean = np.abs(left + right) / 2
         moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
+    turning &= np.isnan(calm.get(YAW_RATE, np.nan))
     share = float(np.mean(turning[moving])) if moving.any() else 0.0
     if share < _MUCH:
         return []
     return [
-        f"The rims of left and right differ in {share:.0%} of the driving, and no signal shows how fast the machine turned: the slips of "
+        f"The rims of left and right differ in {share:.0%} of the driving, where no signal shows how fast the machine turned: the slips of "
         "both sides are wrong there. Give a yaw rate, or positions."
     ]
 
