@@ -40,7 +40,12 @@ def vehicle() -> Vehicle:
             "wheel": {"radius": RADIUS, "inertia": 0.15},
             "tire_rolling_resistance": 0.02,
             "bearing_resistance": 2.0,
-            "uncertainty": {"drive_torque_gain": 0.02, "drive_torque_offset": 0.3, "drawbar_offset": 3.0},
+            "uncertainty": {
+                "drive_torque_gain": 0.02,
+                "drive_torque_offset": 0.3,
+                "drawbar_offset": 3.0,
+                "vertical_load": 0.0,
+            },
         }
     )
 

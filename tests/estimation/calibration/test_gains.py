@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terragrip.estimation import calibrate
+from terragrip.estimation import Calibration, calibrate
 from terragrip.estimation.calibration.gains import _disagreement
 from terragrip.estimation.calibration.procedure import _channel_errors
 from terragrip.estimation.calibration.sharing import Sharing, fit_shared_gains
@@ -129,6 +129,30 @@ def test_one_driven_wheel_has_nothing_to_be_compared_with(drive: Make) -> None:
     kept = {n: x for n, x in log.channels.items() if not n.endswith(("_fr", "_rl", "_rr"))}
     result = calibrate(Recording(log.time, kept), one)
     assert any("no other wheel to compare with" in u.why for u in result.unknown)
+
+
+def test_axle_loads_that_are_off_are_in_the_intervals_but_not_in_what_the_file_counts_with(
+    drive: Make, vehicle: Vehicle
+) -> None:
+    """2 kg of 70 that are on the other axle shift the gains, and adhesion comes out right: not a doubt of it by the gains."""
+    log, wrong = drive(gain=GAIN, standing=10, noise=1.0), vehicle.to_dict()
+    wrong["axles"]["front"]["mass"], wrong["axles"]["rear"]["mass"] = 62.0, 78.0
+
+    def calibrated(**stated: float) -> Calibration:
+        return calibrate(
+            log, Vehicle.from_dict({**wrong, "uncertainty": {"drive_torque_gain": 0.02, **stated}})
+        )
+
+    def held(result: Calibration) -> list[bool]:
+        intervals = [result[f"drive_torque_gain {wheel}"].interval for wheel in WHEELS]
+        return [low < true < high for (low, high), true in zip(intervals, RELATIVE, strict=True)]
+
+    sure, doubtful, unstated = calibrated(vertical_load=0.0), calibrated(vertical_load=0.03), calibrated()
+    assert not any(held(sure))
+    assert all(held(doubtful))
+    assert "axle loads that are 3 % off" in doubtful["drive_torque_gain fl"].sentence
+    assert "axle loads that are 1 % off" in unstated["drive_torque_gain fl"].sentence
+    assert doubtful.uncertainty["drive_torque_gain"] == pytest.approx(sure.uncertainty["drive_torque_gain"])
 
 
 def test_what_is_left_goes_into_the_vehicle(drive: Make, vehicle: Vehicle) -> None:

@@ -13,6 +13,7 @@ from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.sharing import SharedGains, Sharing, fit_shared_gains
 from terragrip.estimation.calibration.windows import Windows, track_blocks, wheel_loads, windows
 from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.physics.loads import load_levers
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -39,12 +40,14 @@ _NO_PULL = (
 
 @dataclass(frozen=True)
 class ChannelErrors:
-    """Standard deviations of constant errors: of dv/dt + g sinθ and of a_y [m/s²], of the drawbar force [N], of the yaw rate [rad/s]."""
+    """Standard deviations of constant errors: of dv/dt + g sinθ and of a_y [m/s²], of the drawbar force [N], of the yaw rate [rad/s], and
+    of the load that the vehicle file puts on the front axles and not on the rear ones, a share of the mean axle load."""
 
     push: float
     lateral: float
     drawbar: float
     yaw: float = 0.0
+    axle_load: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def relative_gains(
     rests_on = evidence(
         table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count
     )
-    quantities = _quantities(fit, covariance, own, vehicle, driven, rests_on, disagreement)
+    quantities = _quantities(fit, covariance, own, vehicle, driven, rests_on, disagreement, errors.axle_load)
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius
     radius_std[driven] = np.sqrt(np.diag(covariance)[len(driven) :])
@@ -121,6 +124,7 @@ def _quantities(
     driven: Ints,
     rests_on: tuple[Evidence, ...],
     disagreement: float,
+    axle_load: float,
 ) -> list[Quantity]:
     from scipy.special import stdtrit  # scipy.stats takes seconds to load
 
@@ -130,6 +134,11 @@ def _quantities(
         f"on the same soil are compared, {fit.windows} windows on {fit.blocks} stretches of track; assumes "
         "the same soil under rear and front wheels"
     )
+    if axle_load > 0 and len(vehicle.axles) > 1:
+        sentence += (
+            f"; the intervals hold axle loads that are {100 * axle_load:.2g} % off (uncertainty: vertical_load), "
+            "and adhesion comes out right in spite of these"
+        )
     if disagreement:
         sentence += (
             f"; the soils disagree, and the intervals are {disagreement * fit.lasting:.1f} times wider"
@@ -260,12 +269,21 @@ def _considered_loads(
         "push": np.nan_to_num(table.push),
         "lateral": np.nan_to_num(table.lateral),
     }
-    before, changes = _mean_loads(table, vehicle, rest), []
+    before = _mean_loads(table, vehicle, rest)
+    changes = [_shifted(before, vehicle, errors.axle_load)]
     for name in rest:
         after = _mean_loads(table, vehicle, {**rest, name: rest[name] + getattr(errors, name)})
         changes.append(after / before - 1)
     effects = [fit.load_sensitivity @ change[driven] for change in changes]
     return np.sum([np.outer(effect, effect) for effect in effects], axis=0)
+
+
+def _shifted(load: Floats, vehicle: Vehicle, share: float) -> Floats:
+    """Relative changes of the wheels' loads (w,) where `share` of a mean axle load moves from the rear to the front (physics.md 6)."""
+    levers, axle = load_levers(vehicle.axle_to_rear), vehicle.wheel_axle
+    largest = max(float(np.abs(levers).max()), 1e-12)  # a single axle has none
+    moved = share * load.sum() / len(levers) * levers / largest
+    return np.asarray((moved / np.bincount(axle, load))[axle])
 
 
 def _unseen_pull(table: Windows, vehicle: Vehicle, driven: Ints) -> float:

@@ -34,6 +34,7 @@ from terragrip.vehicle import Vehicle
 
 _SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle gives none
 _UNSTATED_RADIUS = 0.02  # relative, likewise
+_AXLE_LOAD = 0.01  # of the mean axle load, likewise, of an axle that was weighed
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
 _SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
 
@@ -245,6 +246,7 @@ def _channel_errors(
         push=float(push),
         lateral=float(lateral),
         drawbar=float(errors.get("drawbar_offset", stated.drawbar_offset or 0.0)),
+        axle_load=_AXLE_LOAD if stated.vertical_load is None else stated.vertical_load,
     )
 
 
