@@ -282,7 +282,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
 
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
-    tgi_doubt_speeds(e, &row);
+    tgi_doubt_speeds(e, &row, dt);
     int32_t turned = tgi_track_motion(e, &row);
     if (turned) mirror(&e->held, n);
     tgi_track_turn(e, &row);

@@ -238,6 +238,7 @@ struct tg_estimator {
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8], mass, hitch_load;
     tg_hold wheel[8], ground;  /* speeds */
+    tg_hold forward;           /* acceleration */
     int32_t sparse_wheels;
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
@@ -273,7 +274,7 @@ TG_INLINE tg_real tgi_max(tg_real x, tg_real y) { return x > y ? x : y; }
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
-void tgi_doubt_speeds(tg_estimator *e, tg_row *row);
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
 int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time);
 void tgi_track_turn(tg_estimator *e, const tg_row *row);
@@ -289,6 +290,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 void tgi_find_silent(tg_estimator *e, double time);
 void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving);
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt);
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 tg_real tgi_chatter(const tg_hold *h, tg_real noise);

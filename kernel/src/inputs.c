@@ -33,8 +33,9 @@ static void begin(tg_hold *h, tg_real x, tg_real noise)
 
 /* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
  * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
- * it enters the mean square clipped. `rate`: the change a second that is no spike. `moving`: else the increments are those of a
- * standstill, which show nothing of the start; but a speed needs none to be a spike there, as a log may begin at rest. */
+ * it enters the mean square clipped. `rate`: the change a second that is no spike, but after a gap: nearly everything is possible within
+ * it, and one sample is soon confirmed. Where it is known, the increments before need not be. `moving`: else the increments are those of
+ * a standstill, which show nothing of the start. */
 void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving)
 {
@@ -45,13 +46,14 @@ void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, t
     if (isnan(x)) return;
     if (h->count == 0 || interval > s->gap + TG_PAUSE * h->interval) begin(h, x, noise);
     else {
-        const tg_real before = before_spike(h, x);
-        tg_real change = tgi_square(x - before), bound = k->spike * k->spike * (h->level + 2 * noise * noise) + tgi_square(rate * interval);
+        const tg_real before = before_spike(h, x), most = k->spike * k->spike * (h->level + 2 * noise * noise);
+        const tg_real usual = h->interval > 0 && h->interval < interval ? h->interval : interval;
+        tg_real change = tgi_square(x - before);
         h->spike = 0;
-        if ((h->count > TG_LEAST_SAMPLES || (rate > 0 && !moving)) && change > bound) {
+        if ((h->count > TG_LEAST_SAMPLES || rate > 0) && change > most + tgi_square(rate * usual)) {
             h->spike = change;
             h->mean = h->calm = before;
-            change = bound;
+            change = most;
         } else {
             track(h, x, h->level - 2 * noise * noise, noise, interval, k->input_lag);
             h->calm = x;
@@ -82,17 +84,23 @@ static void believe_leap(tg_hold *h, tg_real dt)
     h->fresh = 1;
 }
 
-/* Torques that leap at the same instant on most of the driven wheels are a manoeuvre, no spikes. */
-static void judge_leaps(tg_estimator *e, double time, tg_real dt)
+/* Of `among` inputs of the wheels, leaps of most at the same instant, one way and alike to a factor of two, are a manoeuvre, no spikes.
+ * `rate`: what each is capable of in a second, where that is known. */
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt)
 {
-    int32_t leaps = 0, driven = 0;
-    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
-        driven += e->settings.driven[i] != 0;
-        leaps += e->torque[i].spike > 0 && e->torque[i].time == time;
+    tg_real leap[8];
+    for (int32_t i = 0; i < wheels; i++) {
+        const int32_t possible = !rate || h[i].spike < tgi_square(rate[i] * h[i].interval);
+        leap[i] = h[i].spike > 0 && h[i].time == time && possible ? h[i].raw - h[i].calm : 0;
     }
-    if (leaps < 2 || 2 * leaps <= driven) return;
-    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
-        if (e->torque[i].spike > 0 && e->torque[i].time == time) believe_leap(&e->torque[i], dt);
+    for (int32_t i = 0; i < wheels; i++) {
+        int32_t alike = 0;
+        for (int32_t j = 0; j < wheels; j++) {
+            const tg_real twice = 2 * leap[i] * leap[j];
+            alike += twice > tgi_square(leap[i]) && twice > tgi_square(leap[j]);
+        }
+        if (alike > 1 && 2 * alike > among) believe_leap(&h[i], dt);
+    }
 }
 
 /* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
@@ -188,12 +196,15 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
 void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
+    int32_t driven = 0;
     memset(drive, 0, sizeof *drive);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const int32_t slot = TG_DRIVE_TORQUE + i;
-        if (s->driven[i]) tgi_hold_update(&e->torque[i], s, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
+        if (!s->driven[i]) continue;
+        tgi_hold_update(&e->torque[i], s, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
+        driven++;
     }
-    judge_leaps(e, row->time, dt);
+    tgi_judge_leaps(e->torque, NULL, s->machine.wheels, driven, row->time, dt);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         const tg_hold *const h = &e->torque[i];

@@ -54,18 +54,30 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 }
 
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
- * is capable of is no spike. */
-void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
+ * is capable of is no spike; after a gap, of most wheels together. A jump of the accelerometer, which the slope
+ * and the loads would keep, is left out until then. */
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
-    const tg_real agile = s->tuned.agility * s->machine.gravity;
+    tg_real rate[9] = {0};
     for (int32_t i = 0; i <= n; i++) {
         const int32_t slot = i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED;
         tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
-        tgi_hold_update(h, s, row->value[slot], row->time, 0, s->noise[slot], i < n ? agile / s->rolling_radius[i] : agile, !e->standing);
+        rate[i] = s->tuned.agility * s->machine.gravity / (i < n ? s->rolling_radius[i] : 1);
+        tgi_hold_update(h, s, row->value[slot], row->time, 0, s->noise[slot], rate[i], !e->standing);
+    }
+    tgi_judge_leaps(e->wheel, rate, n, n, row->time, dt);
+    for (int32_t i = 0; i <= n; i++) {
+        const tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
         row->doubt[i] = h->time == row->time ? h->spike : 0;
         row->outlier |= row->doubt[i] > 0;
+    }
+    tg_hold *const a = &e->forward;
+    tgi_hold_update(a, s, row->value[TG_ACCELERATION_X], row->time, 0, s->noise[TG_ACCELERATION_X], 0, !e->standing);
+    if (a->spike > 0 && a->time == row->time) {
+        row->value[TG_ACCELERATION_X] = (tg_real)NAN;
+        row->outlier = 1;
     }
 }
 

@@ -130,6 +130,49 @@ def test_a_spike_is_flagged_and_barely_moves_the_estimate(channel, method):
     assert np.abs(hit["adhesion_rr"] - plain["adhesion_rr"])[900:].max() < 0.02
 
 
+def test_a_spike_of_the_accelerometer_moves_neither_slope_nor_loads():
+    base = drive(12.0, imu=True).recording
+    spiked = with_values(base, "acceleration_x", 700, base["acceleration_x"][700] + 30.0)
+    plain, hit = run(base), run(spiked)
+    assert hit["event"][700] == "outlier"
+    for name in ("adhesion_fl", "adhesion_rr", "soil_resistance"):
+        assert np.abs(hit[name] - plain[name]).max() < 0.01, name
+    assert np.abs(hit["vertical_load_front"] - plain["vertical_load_front"]).max() < 5.0
+
+
+def test_a_spike_right_after_a_gap_is_one_and_so_is_the_next():
+    """What a wheel may do within a gap shows nothing of what it does from row to row."""
+    base = drive(12.0).recording
+    kept = np.flatnonzero((base.time < 6.0) | (base.time > 6.5))
+    base = Recording(base.time[kept], {name: values[kept] for name, values in base.channels.items()})
+    first = int(np.searchsorted(base.time, 6.25))
+    spiked = with_values(base, "wheel_speed_rr", [first, first + 20], -4.0)
+    plain, hit = run(base), run(spiked)
+    for name in ("adhesion_rr", "adhesion_fl", "soil_resistance"):
+        assert np.abs(hit[name] - plain[name]).max() < 0.05, name
+
+
+def test_a_spike_among_the_first_rows_of_motion_is_one():
+    base = drive(12.0, speed=lambda t: 0.6 * np.clip(t - 2.0, 0.0, 1.0) + 1e-9).recording
+    early = int(np.argmax(run(base)["event"] != "standstill")) + 2
+    spiked = with_values(base, "wheel_speed_fr", early, -14.0)
+    plain, hit = run(base), run(spiked)
+    for name in ("adhesion_fr", "adhesion_rl"):
+        assert np.abs(hit[name] - plain[name])[early:].max() < 0.1, name
+
+
+def test_torques_that_spike_together_but_not_alike_are_no_manoeuvre():
+    base = drive(12.0).recording
+    spiked = base
+    for wheel, size in (("fl", 100.0), ("fr", -80.0), ("rl", 15.0)):
+        name = f"drive_torque_{wheel}"
+        spiked = with_values(spiked, name, 700, base[name][700] + size)
+    plain, hit = run(base), run(spiked)
+    assert hit["event"][700] == "outlier"
+    for wheel in WHEELS:
+        assert np.abs(hit[f"adhesion_{wheel}"] - plain[f"adhesion_{wheel}"]).max() < 0.05
+
+
 def test_clean_data_has_hardly_an_outlier():
     assert np.mean(run(drive(60.0, imu=True).recording)["event"] == "outlier") < 0.002
 
