@@ -1,4 +1,4 @@
-"""The yaw rate of a log whose sensor is missing or falls silent: a wheel's slip is relative to its hub's speed, which depends on the turn."""
+"""The yaw rate of a log whose sensor is missing or silent: a wheel's slip is relative to its hub's speed, which depends on the turn."""
 
 from __future__ import annotations
 
