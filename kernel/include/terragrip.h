@@ -293,9 +293,9 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot determine; 
 typedef struct { /* when the estimator warns of immobilization (see src/digging.c), and calls the vehicle stuck or pushed */
     tg_real pace;                   /* the unit of time, over sqrt(length/gravity) */
     tg_real memory;                 /* units of time, low-pass of the points' sum, the score */
-    tg_real usual;                  /* units of time over which what is usual is learned */
-    tg_real sure;                   /* SDs that are taken off slip where it has to be sure: to be high, and to be warned of, which it is only above its usual, */
-    tg_real ahead;                  /* and where it passes this if it rises as much again in the next unit of time, */
+    tg_real usual;                  /* units of time over which what is usual is learned (slip: half and eight times as many, see src/digging.c) */
+    tg_real sure;                   /* SDs that are taken off slip where it has to be sure: to be high, and to be warned of, which it is */
+    tg_real ahead;                  /* where it passes this, and twice its usual, if it rises as much again in the next unit of time, */
     tg_real warn;                   /* and of a score above this; on until it is half of this */
     tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
     tg_real rise;                   /* a point: rise of slip above its mean over a unit of time */

@@ -7,6 +7,9 @@
 #define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
 #define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
+#define TG_LEARNED ((tg_real)0.5) /* of `usual`: more slip than usual is learned within it, */
+#define TG_FORGOTTEN 8 /* and less within so many of it */
+#define TG_BEYOND 2 /* usual slips that slip has to pass */
 
 /* Exact also where intervals are longer than tau. */
 static tg_real low_pass(tg_real mean, tg_real dt, tg_real tau, tg_real x)
@@ -60,6 +63,15 @@ static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
     sum->travel += weight * l->travel;
 }
 
+/* Where a machine works at much slip, that is soon usual, and stays so over its turns and ways between. */
+static void learn_usual(const tg_watch_settings *s, tg_real pace, tg_real since, tgi_digging *d)
+{
+    const tg_real slip = bounded(d->now[TGI_SLIP], -1, s->high_slip), longest = s->usual * pace;
+    const tg_real usual[2] = {slip, d->now[TGI_BALANCE]};
+    const tg_real memory[2] = {longest * (slip > d->usual[0] ? TG_LEARNED : TG_FORGOTTEN), longest};
+    for (int32_t k = 0; k < 2; k++) d->usual[k] = d->age > 0 ? low_pass(d->usual[k], since, bounded(d->age, 0, memory[k]), usual[k]) : usual[k];
+}
+
 /* Add a row to the interval, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
  * `since` becomes the time between the ends of two. */
 static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
@@ -80,12 +92,7 @@ static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_rea
         d->now[k] = d->moving ? low_pass(d->now[k], *since, TG_SHORT * pace, now[k]) : now[k];
         d->mean[k] = d->moving ? low_pass(d->mean[k], *since, pace, now[k]) : now[k];
     }
-    const tg_real longest = e->settings.watch.usual * pace, tau = d->age < longest ? d->age : longest;
-    const tg_real usual[2] = {d->now[TGI_SLIP], d->now[TGI_BALANCE]};
-    for (int32_t k = 0; k < 2; k++) {
-        const tg_real x = k == 0 && usual[k] > e->settings.watch.high_slip ? e->settings.watch.high_slip : usual[k];
-        d->usual[k] = d->age > 0 ? low_pass(d->usual[k], *since, tau, x) : x;
-    }
+    learn_usual(&e->settings.watch, pace, *since, d);
     memset(&d->sum, 0, sizeof d->sum);
     d->weight = 0;
     d->age += *since;
@@ -126,7 +133,7 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);
-    d->slips = sure > d->usual[0] && sure + rise > s->ahead;
+    d->slips = sure + rise > tgi_max(s->ahead, TG_BEYOND * d->usual[0]);
     return 1;
 }
 

@@ -167,7 +167,7 @@ typedef struct { /* see digging.c */
     tg_real score;             /* their sum, low-passed */
     double time;               /* of the end of the last interval, or where the motion began */
     int32_t moving;            /* there was an interval since the motion began */
-    int32_t slips;             /* slip is surely above its usual, and rises far */
+    int32_t slips;             /* slip rises far, surely, and far beyond its usual */
 } tgi_digging;
 
 typedef struct { /* is the vehicle about to be stuck, stuck, pushed? */

@@ -5,6 +5,7 @@
 #define TG_CALM ((tg_real)0.1)         /* s, low-pass of the rim speed by which a vehicle is called stuck */
 #define TG_HALF_TURN ((tg_real)3.14)   /* wheel radii: rims that went less since the vehicle stood are a start */
 #define TG_SURE 2                      /* SDs of the ground speed */
+#define TG_NEAREST ((tg_real)0.51)     /* of an interval: to the nearest sample, and where two are as near (5 Hz), to the earlier */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
 
 /* Which end of the machine wheel i is at, along the travel: 1 leading, -1 trailing, 0 neither. */
@@ -100,7 +101,7 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-/* Warn where the score is high and slip surely above its usual; go on until the score is half of that. Of rims that hardly turn, or
+/* Warn where the score is high and slip surely rises far beyond its usual; go on until the score is half of that. Of rims that hardly turn, or
  * against each other, no warning is given. */
 static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l, int32_t measured)
 {
@@ -140,7 +141,7 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     const int32_t may_stand = tgi_fabs(l->travel) - unsure < hardly;
     w->spinning = turning ? count_seconds(w->spinning, dt, may_stand, 1, s->stuck_duration) : 0;
     w->held = turning && may_stand && (w->sinking || l->travel < hardly) && tgi_max(l->travel, 0) + unsure < freely;
-    const int32_t long_enough = w->spinning + dt / 2 >= s->stuck_duration; /* to the nearest sample */
+    const int32_t long_enough = w->spinning + TG_NEAREST * dt >= s->stuck_duration;
     w->stuck = turning && ((w->held && long_enough && begun) || (w->stuck && tgi_fabs(l->travel) < freely));
     if (w->stuck) w->sinking = 0;
 }

@@ -20,7 +20,8 @@ from terragrip.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 SHORT, FLOOR, SHARP = 0.1, 0.1, 0.02
-CALM, LONGEST_LOOK, HALF_TURN, SURE = 0.1, 1.5, 3.14, 2
+LEARNED, FORGOTTEN, BEYOND = 0.5, 8, 2
+CALM, NEAREST, LONGEST_LOOK, HALF_TURN, SURE = 0.1, 0.51, 1.5, 3.14, 2
 SLIP, DEVIATION, BALANCE, RESISTANCE, RIM, TRAVEL, BALANCE_DEVIATION, RESISTANCE_DEVIATION = range(8)
 
 
@@ -217,8 +218,11 @@ class Watch:
         for k, x in enumerate(now):
             self.now[k] = _low_pass(self.now[k], since, SHORT * self.pace, x)
             self.mean[k] = _low_pass(self.mean[k], since, self.pace, x)
-        tau = min(self.age, self.limits["usual"] * self.pace)
-        for k, x in enumerate((min(self.now[SLIP], self.limits["high_slip"]), self.now[BALANCE])):
+        slip = min(self.now[SLIP], self.limits["high_slip"])
+        for k, (x, memory) in enumerate(
+            [(slip, LEARNED if slip > self.usual[0] else FORGOTTEN), (self.now[BALANCE], 1)]
+        ):
+            tau = min(self.age, memory * self.limits["usual"] * self.pace)
             self.usual[k] = _low_pass(self.usual[k], since, tau, x) if self.age > 0 else x
         self.sum, self.weight, self.moving, self.time = np.zeros(9), 0.0, True, row.time
         self.age += since
@@ -261,7 +265,7 @@ class Watch:
         ]
         tau = limits["memory"] * self.pace
         self.score = _low_pass(self.score, min(since, self.pace), tau, sum(self.points))
-        self.slips = sure > self.usual[0] and sure + change(SLIP) > limits["ahead"]
+        self.slips = sure + change(SLIP) > max(limits["ahead"], BEYOND * self.usual[0])
 
     def _judge_stuck(self, row: Row) -> None:
         limits, still = self.limits, self.limits["standstill_speed"]
@@ -282,7 +286,7 @@ class Watch:
         self.held = turning and likely and max(row.travel, 0.0) + unsure < freely
         sure = (
             self.held
-            and self.spinning + dt / 2 >= limits["stuck_duration"]
+            and self.spinning + NEAREST * dt >= limits["stuck_duration"]
             and self.turned > HALF_TURN * self.radius
         )
         self.stuck = turning and (sure or (self.stuck and abs(row.travel) < freely))

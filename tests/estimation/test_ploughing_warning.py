@@ -1,0 +1,53 @@
+"""A tool that comes in raises slip as digging in does: it warns while the machine has not shown that it works at such slip. And `stuck`
+of slow receivers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drives import drive, robot
+from terragrip.estimation import Estimates, estimate
+from terragrip.recording import Recording
+
+WORK, TURN, DIGS, STOPS = 10.0, 6.0, 115.0, 119.0
+
+
+def ploughing(t: Any) -> Any:
+    """Slip of .04 in turns and of .22 with the tool in, which comes in within 1.5 s; at the end the wheels dig themselves in."""
+    since = np.mod(t - TURN, WORK + TURN)
+    tool = np.clip(since / 1.5, 0, 1) * np.clip(WORK + 1 - since, 0, 1) * (t > TURN)
+    work = np.where(t < DIGS - WORK, 0.04 + 0.18 * tool, 0.22)
+    return np.where(t < DIGS, work, 0.22 + 0.75 * np.clip((t - DIGS) / (STOPS - DIGS), 0, 1) ** 2)
+
+
+def unseen_pull(slip: Any, seconds: float, rate: float, since: float = 0.0) -> Estimates:
+    """Estimates of a drive with steady rims and no drawbar cell, whose clock begins at ``since`` [s]."""
+    log = drive(seconds, rate=rate, noise=0.3, slip=slip, speed=lambda t: 0.6 * (1 - slip(t))).recording
+    channels = {name: x for name, x in log.channels.items() if name != "drawbar_force"}
+    return estimate(Recording(log.time + since, channels), robot())
+
+
+def begins(estimates: Estimates, kind: str) -> Any:
+    has = estimates["event"] == kind
+    return estimates.time[has & ~np.r_[False, has[:-1]]]
+
+
+def test_the_slip_at_which_a_machine_works_warns_no_more_and_digging_in_from_it_does() -> None:
+    warnings = begins(unseen_pull(ploughing, 125.0, 10.0), "immobilization")
+    assert not ((warnings > 3 * (WORK + TURN)) & (warnings < DIGS)).any()
+    assert ((warnings > DIGS) & (warnings < STOPS - 0.5)).any()
+
+
+@pytest.mark.parametrize("rate", [3.0, 5.0])
+@pytest.mark.parametrize("since", [0.0, 1000.1, 1.7e9])
+def test_stuck_comes_within_half_a_second_whatever_the_clock(rate: float, since: float) -> None:
+    """Half a second from 3 or 5 Hz ends between two samples: which one decided was how their times were rounded."""
+    stop = 20.05
+    estimates = unseen_pull(lambda t: np.where(t < stop, 0.1, 0.99), 25.0, rate, since)
+    first = begins(estimates, "stuck")[0] - since
+    seen = np.ceil(stop * rate) / rate
+    assert first == pytest.approx(seen + 1 / rate * (rate == 5), abs=0.01)
+    assert first <= stop + 0.5
