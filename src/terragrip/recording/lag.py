@@ -24,6 +24,7 @@ _BRIDGED = 1.0  # s, or three samples, between two samples
 _LEAST_OVERLAP = 20.0  # s
 _LEAST_SHARE = 0.3  # of the shorter record
 _LEAST_CORRELATION = 0.8
+_LEAST_IN_PART = 0.6  # of gains or losses of speed alone
 _APART = 2.0  # s from the best offset, where another one must be worse
 _WORSE = 0.02  # in correlation
 _WIDTH = 20  # points over which rates are smoothed: a second
@@ -143,7 +144,31 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
         high = second.pace / (STANDARD_GRAVITY * STIFFNESS)
     elif second.pace is None and first.pace is not None:
         low = -first.pace / (STANDARD_GRAVITY * STIFFNESS)
-    return replace(result, explained=(low, high))
+    lag = replace(result, explained=(low, high))
+    if not lag.is_of_the_clock:
+        return lag
+    return replace(lag, std=float(np.hypot(lag.std, _contradiction(first, second, lag.seconds))))
+
+
+def _contradiction(first: Speed, second: Speed, seconds: float) -> float:
+    """How far [s] from an offset that by the gains of speed alone is, or that by its losses, the farther of those that show one.
+
+    A clock is off by the same in both. A vehicle that digs itself in loses its speed before its driver stops the wheels, but does not
+    gain it before them. What is within the smoothing is one offset.
+    """
+    mine, theirs = _regular(first.time, first.values), _regular(second.time - seconds, second.values)
+    if mine is None or theirs is None:
+        return 0.0
+    rates = [np.gradient(_smooth(values), _STEP) for _, values in (mine, theirs)]
+    apart = theirs[0] - mine[0]
+    lags = np.arange(np.ceil((apart - _WITHIN) / _STEP), (apart + _WITHIN) / _STEP).astype(np.intp)
+    farthest = 0.0
+    for sign in (1.0, -1.0):
+        correlation = _correlation(*(np.maximum(sign * rate, 0.0) for rate in rates), lags)
+        best = int(np.argmax(correlation))
+        if correlation[best] >= _LEAST_IN_PART:
+            farthest = max(farthest, abs(apart - _STEP * int(lags[best])))
+    return farthest if farthest > 0.5 * _WIDTH * _STEP else 0.0
 
 
 def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | None:
