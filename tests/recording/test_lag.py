@@ -74,16 +74,22 @@ def test_between_two_speeds_of_one_kind_the_vehicle_explains_nothing() -> None:
 
 
 def stopped_log(late: float, wheels_stop: float) -> dict[str, np.ndarray]:
-    """Driven off, stopped from 30 s on within 1 s, by its wheels later than that by ``wheels_stop`` [s]. The ground speed is ``late`` [s]."""
+    """Driven off; the vehicle stops from 30 s on, its wheels ``wheels_stop`` [s] after it. The ground speed is ``late`` [s]."""
     ends = np.array([30.0, 31.0])
     speed = np.interp(TIME - late, [2.0, 3.5, *ends], [0.0, 1.0, 1.0, 0.0])
     rims = np.interp(TIME, [2.0, 3.5, *(ends + wheels_stop)], [0.0, 1.05, 1.05, 0.0])
     noise = np.random.default_rng(3).normal(0, 0.01, (2, len(TIME)))
-    return {"ground_speed": speed + noise[0], "wheel_speed_l": rims + noise[1], "wheel_speed_r": rims + noise[1]}
+    return {
+        "ground_speed": speed + noise[0],
+        "wheel_speed_l": rims + noise[1],
+        "wheel_speed_r": rims + noise[1],
+    }
 
 
 @pytest.mark.parametrize("noticed", [1.0, 2.0])
-def test_a_vehicle_that_digs_in_before_its_wheels_are_stopped_has_no_early_ground_speed(noticed: float) -> None:
+def test_a_vehicle_that_digs_in_before_its_wheels_are_stopped_has_no_early_ground_speed(
+    noticed: float,
+) -> None:
     """The log was shifted by up to that, and its warning and `stuck` came so much later."""
     part = TIME < 45
     lag = lag_within(TIME[part], {n: x[part] for n, x in stopped_log(0.0, noticed).items()})
