@@ -164,7 +164,8 @@ def _contradiction(first: Speed, second: Speed, seconds: float) -> float:
     lags = np.arange(np.ceil((apart - _WITHIN) / _STEP), (apart + _WITHIN) / _STEP).astype(np.intp)
     farthest = 0.0
     for sign in (1.0, -1.0):
-        correlation = _correlation(*(np.maximum(sign * rate, 0.0) for rate in rates), lags)
+        ours, other = (np.maximum(sign * rate, 0.0) for rate in rates)
+        correlation = _correlation(ours, other, lags)
         best = int(np.argmax(correlation))
         if correlation[best] >= _LEAST_IN_PART:
             farthest = max(farthest, abs(apart - _STEP * int(lags[best])))
