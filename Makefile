@@ -95,8 +95,9 @@ mutants: $(VENV)/package $(VENV)/dev ## do the tests notice? 400 random changes 
 	@$(BIN)/python benchmarks/mutants.py --workers $(WORKERS)
 
 lock: $(VENV)/made ## resolve the dependencies anew into requirements.lock and requirements-dev.lock
+	$(PIP) install --quiet uv
 	echo 'setuptools>=77' | $(BIN)/uv pip compile $(LOCK_FLAGS) --extra all pyproject.toml - -o requirements.lock
-	echo uv | $(BIN)/uv pip compile $(LOCK_FLAGS) - -o requirements-uv.lock
+	echo pip | $(BIN)/uv pip compile $(LOCK_FLAGS) - -o requirements-pip.lock
 	$(BIN)/uv pip compile $(LOCK_FLAGS) --extra dev -c requirements.lock pyproject.toml -o requirements-dev.lock
 LOCK_FLAGS := --quiet --upgrade --generate-hashes --universal --python-version 3.11 --no-annotate --no-emit-index-url \
 	--no-emit-find-links --fork-strategy fewest --custom-compile-command "make lock"
@@ -124,12 +125,8 @@ clean: ## remove everything that was built or installed
 	rm -f src/terragrip/*.so src/terragrip/*/*.so src/terragrip/_kernel_*.py src/terragrip/simulation/_plant.py
 
 # --- the environment -------------------------------------------------------------------------------------------------
-# Each file below is a stamp: it is newer than what it was made from, so a second run does nothing. uv installs in a third of pip's time and
-# writes nowhere else; where it cannot (no file for this machine, an index that pip's configuration names), pip does.
-# -qq: warnings are about indexes that lack a package, one for each.
-INSTALL = $(BIN)/uv pip install --quiet --no-config --no-cache --require-hashes --python $(BIN)/python -r $(1) 2> /dev/null \
-	|| $(PIP) install -qq --no-compile -r $(1)
-
+# Each file below is a stamp: it is newer than what it was made from, so a second run does nothing. The pip that installs is a recent one:
+# that of Python 3.11 takes twice the time. -qq: warnings are about indexes that lack a package, one for each.
 $(VENV)/made:
 	@python=""; for candidate in $(if $(PYTHON),$(PYTHON),$(CANDIDATES)); do \
 	  if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then python="$$candidate"; break; fi; \
@@ -142,20 +139,20 @@ $(VENV)/made:
 	  echo "make: no C compiler named $(CC); on Debian and Ubuntu: apt-get install gcc libc6-dev, or name one: make CC=clang" >&2; exit 1; fi; \
 	echo "Setting up $(VENV) with $$("$$python" -c 'import sys; print(sys.executable, sys.version.split()[0])')"; \
 	"$$python" -m venv --clear $(VENV)
-	@$(PIP) install -qq -r requirements-uv.lock || echo "make: pip installs, which is slower: there is no uv for it" >&2
+	@$(PIP) install -qq -r requirements-pip.lock || echo "make: pip stays as it came with Python, which is slower" >&2
 	@$(BIN)/python -c 'import sys; print(sys._base_executable, sys.version)' > $@
 
-# Byte code on two processors (nobody imports the few files that do not compile), without the packages' own tests.
+# Byte code on two processors, as pip does it on one (nobody imports the few files that do not compile), without the packages' own tests.
 $(VENV)/runtime: $(VENV)/made requirements.lock
 	@echo "Installing the packages of requirements.lock"
-	@$(call INSTALL,requirements.lock)
+	@$(PIP) install -qq --no-compile -r requirements.lock
 	@$(BIN)/python -m compileall -qq -j 2 -x '/tests?/' $(VENV)/lib || true
 	@touch $@
 
 # Beside the package, which the compiler is at for most of the time: both have what is in runtime already and add what the other does not.
 $(VENV)/dev: $(VENV)/runtime requirements-dev.lock
 	@echo "Installing the packages of requirements-dev.lock"
-	@$(call INSTALL,requirements-dev.lock)
+	@$(PIP) install -qq --no-compile -r requirements-dev.lock
 	@touch $@
 
 $(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
