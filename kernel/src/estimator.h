@@ -104,7 +104,7 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
 
 typedef struct { /* uneven ground, see roughness.c */
     tg_real adhesion[8], resistance; /* low-passed over the distance, */
-    tg_real calm;                    /* rho_s over the length of bumps */
+    tg_real mean_resistance;         /* rho_s over the length of bumps */
     tg_real scatter, square;         /* mean squares: of a wheel's adhesion beyond the others', of the adhesion */
     tg_real own;                     /* mean variance of an adhesion, by the filter */
     tg_real wander, bumps;           /* mean squares of rho_s about both: what soil and bumps do within metres, and bumps alone */
@@ -121,7 +121,7 @@ typedef struct { /* slips of the driven wheels in a row; 0 of others */
 typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real now[8], adhesion[8]; /* wheel: adhesion of the row, and low-passed over the length of unevenness */
     tg_real usual[8], slip[8]; /* wheel: slip beyond all trends as a rule, and beyond that low-passed over `slip_length` */
-    tg_real each[8];           /* wheel: slip, low-passed over the length of unevenness */
+    tg_real wheel_slip[8];     /* wheel: slip, low-passed over the length of unevenness */
     tg_real square, noise;     /* mean squares of that slip before the low-pass: the whole, and the part by errors of the wheel speeds */
     tg_real level, sure;       /* mean square of the slip of all wheels; mean weight of a row in `usual` */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
@@ -221,7 +221,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
     tg_real inverse_radius[8];      /* wheel, of the rolling radius */
     tg_real at_rest[8];             /* wheel: its share of the driven wheels' load at rest */
-    tg_real at_work[8], work;       /* wheel: its share of the load of those watched; their share of the driven wheels' */
+    tg_real watched_share[8], work;       /* wheel: its share of the load of those watched; their share of the driven wheels' */
     tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */
 } tgi_constants;
 

@@ -101,8 +101,8 @@ static tg_real count_seconds(tg_real seconds, tg_real dt, int32_t holds, tg_real
     return seconds < 0 ? 0 : seconds > most ? most : seconds;
 }
 
-/* Warn where the score is high and slip surely rises far beyond its usual; go on until the score is half of that. Of rims that hardly turn, or
- * against each other, no warning is given. */
+/* Warn where the score is high and slip surely rises far beyond its usual; go on until the score is half of that. Of rims that hardly
+ * turn, or against each other, no warning is given. */
 static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l, int32_t measured)
 {
     const tg_watch_settings *s = &e->settings.watch;

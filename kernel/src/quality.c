@@ -54,8 +54,8 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 }
 
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
- * is capable of is no spike; after a gap, of most wheels together. A jump of the accelerometer, which the slope
- * and the loads would keep, is left out until then. */
+ * is capable of is no spike; after a gap, of most wheels together. A jump of the accelerometer, which the slope and the loads would keep,
+ * is left out until then. */
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
 {
     const tg_settings *s = &e->settings;

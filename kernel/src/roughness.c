@@ -76,11 +76,11 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     r->square += gain * (square - r->square);
     count_square(&r->own, own, least, k->uneven_most, gain);
     watch_hills(e, rho, travelled);
-    if (!flowing) r->resistance = r->calm = rho;
+    if (!flowing) r->resistance = r->mean_resistance = rho;
     r->resistance += fresh * (rho - r->resistance);
-    r->calm += travelled / (TG_LOAD_LENGTH + travelled) * (rho - r->calm);
+    r->mean_resistance += travelled / (TG_LOAD_LENGTH + travelled) * (rho - r->mean_resistance);
     count_square(&r->wander, tgi_square(rho - r->resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
-    count_square(&r->bumps, tgi_square(rho - r->calm), TG_SMALL_RESISTANCE, k->uneven_most, gain);
+    count_square(&r->bumps, tgi_square(rho - r->mean_resistance), TG_SMALL_RESISTANCE, k->uneven_most, gain);
     count_square(&r->own_resistance, e->belief.P[n * (tgi_stride(n) + 1)], TG_SMALL_RESISTANCE, k->uneven_most, gain);
 }
 

@@ -43,15 +43,15 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
     }
     for (int32_t j = 0; j < n && driven; j++) {
         c->at_rest[j] = weight[j] / whole;
-        c->at_work[j] = c->watched[j] ? c->at_rest[j] : 0;
-        work += c->at_work[j];
+        c->watched_share[j] = c->watched[j] ? c->at_rest[j] : 0;
+        work += c->watched_share[j];
         for (int32_t i = 0; i < n; i++) {
             c->beyond[j][i] = i == j;
             for (int32_t a = 0; a < found; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
             c->beyond[j][i] *= c->pulls[i];
         }
     }
-    for (int32_t j = 0; j < n && work > 0; j++) c->at_work[j] /= work;
+    for (int32_t j = 0; j < n && work > 0; j++) c->watched_share[j] /= work;
     c->work = work > 0 ? work : 1;
     c->warps = driven - found;
     c->slopes = found > 1 && !(merely && c->warps) ? found - 1 : 0; /* see hidden.c */
@@ -109,8 +109,8 @@ static tg_real usual_slip(const tg_estimator *e, tg_real before)
     const tg_real bend = e->settings.tuned.bend, place = tgi_max(before, e->settings.tuned.least_slip), half = place / c->work * bend / (1 - bend);
     tg_real mean = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
-        const tg_real slip = tgi_max(e->warped.each[i], 0);
-        mean += c->at_work[i] * slip / (slip + half);
+        const tg_real slip = tgi_max(e->warped.wheel_slip[i], 0);
+        mean += c->watched_share[i] * slip / (slip + half);
     }
     return place * mean / (1 - bend);
 }
@@ -142,7 +142,7 @@ static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travell
         w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
         pull += c->at_rest[i] * e->belief.x[i];
-        w->each[i] += fresh * (slips->along[i] - w->each[i]);
+        w->wheel_slip[i] += fresh * (slips->along[i] - w->wheel_slip[i]);
     }
     w->square += weight * gain * (square * c->share - w->square);
     w->noise += weight * gain * (noise - w->noise);
@@ -173,8 +173,8 @@ static tg_real farthest_wheel(const tg_estimator *e)
 {
     const tgi_constants *c = &e->constants;
     tg_real mean = 0, far = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->at_work[i] * e->warped.each[i];
-    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->at_work[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.each[i] - mean)) : far;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->watched_share[i] * e->warped.wheel_slip[i];
+    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->watched_share[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.wheel_slip[i] - mean)) : far;
     return far;
 }
 
