@@ -33,6 +33,22 @@ def test_a_drive_and_an_axle_that_is_off_say_nothing() -> None:
     assert dropout_warnings(pulling(**off)) == []
 
 
+def test_a_receiver_and_all_wheels_that_read_0_are_named() -> None:
+    """Slip was 1.1 off and soil resistance .02 behind wheels that all read 0; a receiver that reads 0 without a fix made 'stuck' alone."""
+    rows = (TIME >= 20) & (TIME <= 30)
+    (note,) = dropout_warnings(log(ground_speed=np.where(rows, 0.0, log().channels["ground_speed"])))
+    assert note.startswith(
+        "ground_speed is 0 from 20 to 30 s while all wheels turn: the vehicle is stuck, or"
+    )
+    wheels = {n: np.where(rows, 0.0, log().channels[n]) for n in ("wheel_speed_l", "wheel_speed_r")}
+    (note,) = dropout_warnings(log(**wheels))
+    assert note.startswith("wheel_speed_l, wheel_speed_r are 0 from 20 to 30 s while the vehicle drives")
+    assert (
+        dropout_warnings(log(**wheels, ground_speed=np.where(rows, 0.0, log().channels["ground_speed"])))
+        == []
+    )
+
+
 @pytest.mark.parametrize("name", ["ground_speed", "wheel_speed_l"])
 def test_zeros_for_values_that_were_not_there_are_named(name: str) -> None:
     """With every tenth ground speed 0 slip was .3 beyond the truth, and nothing was said."""

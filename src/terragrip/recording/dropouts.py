@@ -1,53 +1,146 @@
-"""A wheel's speed, or one wheel's torque, that drops to 0 while the others go on: sentences for the user, never errors."""
+"""Speeds, torques and a drawbar force that drop to 0 while the rest of the drive goes on: sentences for the user, never errors."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part
 from terragrip.recording.lag import measured
+from terragrip.recording.mechanics import PULL, Means
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.stretches import DRIVING, is_one_value, longest, may_last
+from terragrip.recording.stretches import DRIVING, LONG, is_one_value, longest, may_last
+from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
 
 
 _BLINK = 1.0  # s, or three samples: a speed that is 0 no longer
 _GOES_ON = 0.5  # of another speed around
 _SURE = 5.0  # standard deviations of the noise: less is rounded to 0 by chance
 _FEWEST = 5  # such samples
+_LOST = 0.5  # of the usual pull: less is what soil and hills change
 
 
 def dropout_warnings(recording: Recording) -> list[str]:
-    """A sentence on each wheel that reads 0 for long while ground speed and other wheels go on, and on each torque that alone does."""
-    return _wheels(recording) + _torques(recording) + _blinks(recording)
+    """Sentences on speeds that read 0 for long while others go on, on each torque that alone does, and on zeros between other values."""
+    return _wheels(recording) + _ground(recording) + _torques(recording) + _blinks(recording)
+
+
+def zero_warnings(
+    recording: Recording, vehicle: Vehicle, means: Means | None, thrusts: dict[str, Floats]
+) -> list[str]:
+    """A sentence on all torques, and on a drawbar force, that are exactly 0 for long where the balance of forces shows that they were not;
+    ``thrusts``: those of `thrusts_of`."""
+    if means is None or not thrusts:
+        return []
+    pull = recording.channels.get("drawbar_force")
+    left = (
+        np.sum(list(thrusts.values()), axis=0) - means.change - (0.0 if means.climb is None else means.climb)
+    )
+    found = _zeros(recording, means, left, [f"drive_torque_{wheel}" for wheel in thrusts])
+    notes = []
+    if (
+        found and -median(left[found.rows]) > PULL * STANDARD_GRAVITY
+    ):  # a vehicle that coasts is left with its resistance
+        notes.append(
+            f"{found.text} the vehicle pulls or climbs: no drive does that. Leave these cells empty."
+        )
+    found = None if pull is None else _zeros(recording, means, left, ["drawbar_force"])
+    if pull is not None and found:  # a tool that is lifted is no thrust that goes on
+        lost, drawn = median(left[found.rows]) - median(left[found.others]), means.of(pull)[found.others]
+        if lost > max(PULL * STANDARD_GRAVITY, _LOST * median(drawn) / vehicle.mass):
+            notes.append(
+                f"{found.text} the wheels drive on as hard as before: not measured, it seems. Leave these cells empty."
+            )
+    return notes
+
+
+@dataclass(frozen=True)
+class _Zeros:
+    """Windows (n,) in which channels are 0 throughout, the ``others``, and the beginning of a sentence."""
+
+    rows: Bools
+    others: Bools
+    text: str
+
+
+def _zeros(recording: Recording, means: Means, left: Floats, names: list[str]) -> _Zeros | None:
+    """None where they are 0 for less than `LONG`, or else."""
+    columns = [recording.channels[name] for name in names]
+    zero = np.logical_and.reduce([values == 0.0 for values in columns])
+    stretch = longest(recording.time, zero, np.isfinite(np.sum(columns, axis=0)))
+    rows = (means.of(zero.astype(np.float64)) == 1.0) & np.isfinite(left)
+    others = ~rows & np.isfinite(left)
+    if not stretch or min(rows.sum(), others.sum()) * means.length < LONG:
+        return None
+    verb = "are" if len(names) > 1 else "is"
+    text = f"{', '.join(names)} {verb} exactly 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while"
+    return _Zeros(rows, others, text)
 
 
 def _wheels(recording: Recording) -> list[str]:
-    """A sentence on each wheel that reads 0 for long while the ground speed, and other wheels, go on."""
+    """A sentence on wheels that read 0 for long while the ground speed goes on."""
     rims = [n for n in recording.channels if n == "wheel_based_speed" or n.startswith("wheel_speed_")]
     ground, notes = recording.channels.get("ground_speed"), []
     if ground is None or len(rims) < 2 or not np.isfinite(ground).any():
         return []
     if not any(may_last(*known_part(recording.time, recording.channels[name])) for name in rims):
         return []
-    zero = {name: recording.channels[name] == 0.0 for name in rims}
-    driving = np.abs(ground) > DRIVING * float(np.nanquantile(np.abs(ground), 0.95))
+    driving = _drives(ground)
+    stretches: dict[tuple[float, float], list[str]] = {}
     for name in rims:
-        if not zero[name].any() or is_one_value(recording.channels[name]):
+        values = recording.channels[name]
+        if is_one_value(values):
             continue
-        alone = zero[name] & driving & ~np.logical_and.reduce(list(zero.values()))
-        stretch = longest(recording.time, alone, np.isfinite(recording.channels[name]) & np.isfinite(ground))
+        stretch = longest(
+            recording.time, (values == 0.0) & driving, np.isfinite(values) & np.isfinite(ground)
+        )
         if stretch:
-            notes.append(
-                f"{name} is 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while the vehicle drives: the wheel is locked, or its sensor "
-                "lost the signal. If it did, leave these cells empty."
-            )
+            stretches.setdefault(stretch, []).append(name)
+    for stretch, names in stretches.items():
+        few = len(names) == 1
+        notes.append(
+            f"{', '.join(names)} {'is' if few else 'are'} 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while the vehicle drives: "
+            f"{'the wheel is locked, or its sensor' if few else 'the wheels are locked, or their sensors'} lost the signal. If "
+            f"{'it' if few else 'they'} did, leave these cells empty."
+        )
     return notes
+
+
+def _drives(speed: Floats) -> Bools:
+    """Where a speed (n,) is that of a drive."""
+    known = np.abs(speed[np.isfinite(speed)])
+    return np.abs(speed) > DRIVING * (quantile(known, 0.95) if len(known) else 0.0)
+
+
+def _ground(recording: Recording) -> list[str]:
+    """A sentence on a ground speed that reads 0 for long while all wheels go on."""
+    rims = [
+        v for n, v in recording.channels.items() if n == "wheel_based_speed" or n.startswith("wheel_speed_")
+    ]
+    ground = recording.channels.get("ground_speed")
+    if (
+        ground is None
+        or not rims
+        or is_one_value(ground)
+        or not may_last(*known_part(recording.time, ground))
+    ):
+        return []
+    rows = np.logical_and.reduce([ground == 0.0, *(_drives(rim) for rim in rims)])
+    stretch = longest(recording.time, rows, np.isfinite(np.sum([ground, *rims], axis=0)))
+    if not stretch:
+        return []
+    return [
+        f"ground_speed is 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while all wheels turn: the vehicle is stuck, or its sensor lost "
+        "the signal. If it did, leave these cells empty."
+    ]
 
 
 def _torques(recording: Recording) -> list[str]:

@@ -35,7 +35,7 @@ _SURE = 3.0  # standard errors
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
 _FACTOR = 1.8  # larger than an uncalibrated torque and an estimated mass change a force balance
-_PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
+PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
@@ -277,11 +277,11 @@ def _pull_warnings(
     if known.sum() < _LEAST:
         return []
     pulled, rest = float(np.mean(pull[known])), float(np.mean(left[known]))
-    if pulled < -_PULL:
+    if pulled < -PULL:
         return [
             f"drawbar_force is {pulled:.2g} of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile."
         ]
-    if rest < -_PULL:
+    if rest < -PULL:
         return [
             f"The drive torques over the wheel radius are {rest + pulled:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
             "which leaves nothing to drive the vehicle: check the units of both, and that each wheel has its torque."

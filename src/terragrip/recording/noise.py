@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 _FEWEST = 20
 _ENOUGH = 20_000  # third differences: their median is then known to a per cent
-_MAD_TO_SD = 1.482602218505602  # of a normal distribution
+MAD_TO_SD = 1.482602218505602  # of a normal distribution
 _ROWS, _SAMPLES = 1000, 500  # of eight parts of a channel, and of those together: they show a resolution
 _RESTLESS = 0.1  # share of values unlike the one before: a channel that changes less often has set-points
 _NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
@@ -71,7 +71,7 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     apart = when[:, :, None] - when[:, None, :] + np.eye(4)
     weight = 1.0 / apart.prod(axis=2)
     third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
-    scale = _MAD_TO_SD * median(np.abs(third))
+    scale = MAD_TO_SD * median(np.abs(third))
     floor = quantum(values) / np.sqrt(12.0)
     return max(scale, floor, 1e-4 * quantile(np.abs(usual_values(values)), 0.95))
 

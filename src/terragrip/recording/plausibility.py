@@ -10,11 +10,12 @@ import numpy.typing as npt
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
-from terragrip.recording.dropouts import dropout_warnings
+from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
+from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
 from terragrip.recording.ranks import median, quantile
@@ -102,6 +103,11 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     placed = _position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds))
     courses = None if speeds or sided or placed else Courses.of(recording, known)
     moved = moved or acceleration_warnings(courses)
+    lost = (
+        []
+        if known is None
+        else zero_warnings(recording, known, means, thrusts) or leap_warnings(recording, known)
+    )
     notes = [
         *speeds,
         *sided,
@@ -117,10 +123,11 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         *copied,
         *(
             torque_warnings(recording, known, means, thrusts) or balance_warnings(courses, known)
-            if known is not None and not (moved or unsigned)
+            if known is not None and not (moved or unsigned or lost)
             else ()
         ),
         *(inertial_warnings(recording, known) if known is not None else ()),
+        *lost,
         *frozen,
         *codes,
         *made,

@@ -1,0 +1,142 @@
+"""A force whose zero moves, or whose signal goes, in the middle of a drive: sentences for the user, never errors.
+
+The wheels' thrust Σ M/r less the drawbar force is the mass times dv/dt + g sin(pitch), plus a resistance (physics.md 1), at each instant:
+a force that truly leaps moves the vehicle, or another force answers. One that leaps from a sample to the next and stays, and whose whole
+leap the balance is left with, was not there. Pitch and accelerometer are not judged so: where a bump ends they leap as well, and a
+filtered pitch is off by as much for seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from terragrip.arrays import Bools, Floats
+from terragrip.recording.held import known_part
+from terragrip.recording.mechanics import PULL
+from terragrip.recording.noise import MAD_TO_SD
+from terragrip.recording.ranks import median, quantile
+from terragrip.recording.rolling import driven_radii
+from terragrip.recording.schema import unit_of
+from terragrip.recording.stretches import DRIVING, LONG, gaps
+from terragrip.recording.turns import filled
+from terragrip.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_SLOWEST = 0.15  # s between samples, 10 Hz with jitter: within more a speed control answers, and soil changes under the wheels
+_SURE = 5.0  # standard deviations of its steps: no sample of a log leaps so far by chance
+_BEYOND = 3.0  # standard deviations of what the balance is left with all the time, as soil and hills change
+_HALF = 0.5  # of it, at least, is between two samples
+_REST = 0.25  # of it, at most, is answered, or gone again
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """Instants (n,) halfway between rows, and which of them have `LONG` of driving one way on both sides."""
+
+    time: Floats
+    middle: Floats
+    inside: Bools
+    speed: Floats
+
+    def shift(self, values: Floats) -> Floats:
+        """The mean of a channel (n + 1,) over `LONG` after each instant less that before it."""
+        steps = np.diff(self.time)
+        area = np.r_[0.0, np.cumsum(steps * (values[1:] + values[:-1]) / 2)]
+        at = [np.interp(self.middle + k * LONG, self.time, area) for k in (-1, 0, 1)]
+        return np.asarray((at[2] - 2 * at[1] + at[0]) / LONG)
+
+    @property
+    def motion(self) -> Floats:
+        """The same of the change of ground speed."""
+        at = [np.interp(self.middle + k * LONG, self.time, self.speed) for k in (-1, 0, 1)]
+        return np.asarray((at[2] - 2 * at[1] + at[0]) / LONG)
+
+
+def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence on each force, or torques at once, whose leap nothing in the balance of forces answers."""
+    channels, radii = recording.channels, driven_radii(vehicle)
+    drive = _drive_of(recording)
+    if drive is None or not radii or not all(f"drive_torque_{wheel}" in channels for wheel in radii):
+        return []
+    parts = {
+        f"drive_torque_{wheel}": channels[f"drive_torque_{wheel}"] / radius / vehicle.mass
+        for wheel, radius in radii.items()
+    }
+    if "drawbar_force" in channels:
+        parts["drawbar_force"] = -channels["drawbar_force"] / vehicle.mass
+    climb = STANDARD_GRAVITY * np.sin(channels["pitch"]) if "pitch" in channels else np.zeros(len(recording))
+    return _unanswered(recording, drive, parts, climb)
+
+
+def _drive_of(recording: Recording) -> _Drive | None:
+    time, ground = recording.time, recording.channels.get("ground_speed")
+    if ground is None or np.isfinite(ground).sum() < 2 or not np.all(np.diff(time) > 0):
+        return None
+    if time[-1] - time[0] < 2 * LONG or median(np.diff(time)) > _SLOWEST:
+        return None
+    speed = filled(time, ground)
+    middle = (time[1:] + time[:-1]) / 2
+    least = DRIVING * quantile(np.abs(speed), 0.95)
+    stops = np.r_[
+        0,
+        np.cumsum(
+            (np.abs(speed) < least) | np.r_[False, np.diff(np.sign(speed)) != 0] | np.r_[False, gaps(time)]
+        ),
+    ]
+    first, last = np.searchsorted(time, middle - LONG), np.searchsorted(time, middle + LONG)
+    inside = (middle - LONG > time[0]) & (middle + LONG < time[-1]) & (stops[last] == stops[first])
+    return _Drive(time, middle, inside, speed) if inside.any() else None
+
+
+def _unanswered(recording: Recording, drive: _Drive, parts: dict[str, Floats], climb: Floats) -> list[str]:
+    """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with."""
+    if any(np.isfinite(part).sum() < 2 for part in (*parts.values(), climb)):
+        return []
+    thrust = np.sum([filled(drive.time, part) for part in parts.values()], axis=0)
+    left = drive.shift(thrust - filled(drive.time, climb)) - drive.motion
+    least = max(PULL * STANDARD_GRAVITY, _BEYOND * MAD_TO_SD * median(np.abs(left[drive.inside])))
+    leaps = {name: _leaps(drive, part) for name, part in parts.items()}
+    leap = np.sum(list(leaps.values()), axis=0)
+    rows = drive.inside & (np.abs(leap) > least) & (np.abs(left - leap) < _REST * np.abs(leap))
+    found: dict[tuple[str, ...], list[int]] = {}
+    for k in np.flatnonzero(rows):
+        found.setdefault(tuple(name for name in parts if leaps[name][k]), []).append(int(k))
+    return [_sentence(recording, drive, names, instants) for names, instants in found.items()]
+
+
+def _leaps(drive: _Drive, part: Floats) -> Floats:
+    """By how much a channel (n + 1,) leaps from a sample to the next at each instant (n,), by the medians of three samples before and
+    after; 0: no more than it does all the time."""
+    when, what = known_part(drive.time, part)
+    steps, result = np.diff(what), np.zeros(len(drive.middle))
+    updates = np.diff(when[1:][steps != 0.0])
+    if (
+        len(what) < 6 or not len(updates) or median(updates) > _SLOWEST
+    ):  # held between values that are too far apart
+        return result
+    calm = np.median(sliding_window_view(what, 3), axis=1)
+    leaps = calm[3:] - calm[:-3]
+    rows = (np.abs(leaps) > _SURE * MAD_TO_SD * median(np.abs(leaps))) & (np.diff(when)[2:-2] <= _SLOWEST)
+    rows &= np.abs(steps[2:-2] - leaps) < _HALF * np.abs(leaps)
+    result[np.searchsorted(drive.time, when[3:-2][rows]) - 1] = leaps[rows]
+    return result
+
+
+def _sentence(recording: Recording, drive: _Drive, names: tuple[str, ...], instants: list[int]) -> str:
+    k, times = instants[0], len(instants) - 1
+    values = [filled(drive.time, recording.channels[name]) for name in names]
+    to = ", ".join(f"from {value[k]:.3g} to {value[k + 1]:.3g}" for value in values)
+    leap, stay, their = ("leap", "stay", "their") if len(names) > 1 else ("leaps", "stays", "its")
+    return (
+        f"{', '.join(names)} {leap} {to} {unit_of(names[0])} at {drive.middle[k]:.5g} s"
+        + (f", and {times} times more," if times else "")
+        + f" and {stay} there, while neither the motion nor another force answers: {their} zero moved, or the signal was lost. Estimates "
+        "are wrong by it before or after: correct these cells, or leave them empty."
+    )

@@ -1,0 +1,100 @@
+"""A force whose zero moves, or that is lost, in the middle of a drive by Newton's second law is named; forces that leap are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+G, RADIUS, WHEELS = 9.80665, 0.2, ("fl", "fr", "rl", "rr")
+TIME = np.arange(0, 120, 0.05)
+TORQUES = tuple(f"drive_torque_{wheel}" for wheel in WHEELS)
+
+
+def drive(
+    vehicle: Vehicle, pull: np.ndarray | None = None, *, coasting: tuple[float, float] | None = None
+) -> dict[str, np.ndarray]:
+    """Two minutes at 20 Hz: a command that drives the machine towards .7 m/s, a pull, resistance of .08 of the weight (simulated)."""
+    draws = np.random.default_rng(20)
+    drawn = 250 + 60 * np.sin(TIME / 4) if pull is None else pull
+    weight, speed, thrust = vehicle.mass * G, np.full(len(TIME), 0.7), np.zeros(len(TIME))
+    for k in range(len(TIME)):
+        on = coasting is None or not coasting[0] <= TIME[k] < coasting[1]
+        wanted = 0.7 + 0.1 * np.sin(TIME[k] / 3)
+        thrust[k] = on * (drawn[k] + 0.08 * weight + 2 * vehicle.mass * (wanted - speed[k]))
+        if pull is not None and k:  # the drive answers the pull within half a second, as slip grows
+            thrust[k] = thrust[k - 1] + 0.1 * (thrust[k] - thrust[k - 1])
+        if k + 1 < len(TIME):
+            speed[k + 1] = speed[k] + 0.05 * (thrust[k] - drawn[k] - 0.08 * weight) / vehicle.mass
+    columns = {"time": TIME, "ground_speed": speed + 0.01 * draws.standard_normal(len(TIME))}
+    front = (54 * G - drawn * 0.25 / 0.638 - vehicle.mass * np.gradient(speed, TIME) * 0.3 / 0.638) / weight
+    for wheel in WHEELS:
+        share = (front if wheel.startswith("f") else 1 - front) / 2  # as the loads
+        columns[f"drive_torque_{wheel}"] = RADIUS * thrust * share + 0.5 * (
+            thrust > 0
+        ) * draws.standard_normal(len(TIME))
+        columns[f"wheel_speed_{wheel}"] = speed / RADIUS / (
+            1 - thrust / weight / 2
+        ) + 0.03 * draws.standard_normal(len(TIME))
+    columns["drawbar_force"] = drawn + 3 * draws.standard_normal(len(TIME))
+    return columns
+
+
+def notes(columns: dict[str, np.ndarray], vehicle: Vehicle) -> list[str]:
+    return list(unit_warnings(Recording.from_frame(columns), vehicle))
+
+
+def changed(
+    columns: dict[str, np.ndarray], names: tuple[str, ...], gain: float, offset: float
+) -> dict[str, np.ndarray]:
+    late = TIME >= 60
+    return columns | {name: np.where(late, gain * columns[name] + offset, columns[name]) for name in names}
+
+
+def test_a_right_drive_has_no_leap(vehicle: Vehicle) -> None:
+    assert notes(drive(vehicle), vehicle) == []
+
+
+@pytest.mark.parametrize(
+    ("names", "gain", "offset"),
+    [
+        (("drawbar_force",), 1.0, 80.0),
+        (("drawbar_force",), 1.0, -80.0),
+        (TORQUES, 1.0, 6.0),
+        (TORQUES, 0.5, 0.0),
+        (TORQUES[:1], 1.0, 15.0),
+    ],
+)
+def test_a_zero_that_moves_is_named(
+    vehicle: Vehicle, names: tuple[str, ...], gain: float, offset: float
+) -> None:
+    """Soil resistance was .06 off behind a moved zero of the drawbar, .12 behind one of all torques, surely and without a word."""
+    found = notes(changed(drive(vehicle), names, gain, offset), vehicle)
+    (note,) = (note for note in found if "neither the motion nor another force answers" in note)
+    assert note.startswith(", ".join(names))
+    assert " at 59.97" in note
+
+
+def test_a_drawbar_cell_or_torques_that_fall_to_0_are_named(vehicle: Vehicle) -> None:
+    """Soil resistance was .27 too high behind a drawbar cell that was unplugged, -.3 behind torques that were 0, without a word."""
+    pulled = notes(changed(drive(vehicle), ("drawbar_force",), 0.0, 0.0), vehicle)
+    assert any(note.startswith("drawbar_force is exactly 0 from 60 to 120 s while") for note in pulled)
+    driven = notes(changed(drive(vehicle), TORQUES, 0.0, 0.0), vehicle)
+    assert any(
+        note.startswith(f"{', '.join(TORQUES)} are exactly 0 from 60 to 120 s while") for note in driven
+    )
+
+
+def test_a_tool_that_comes_in_or_out_at_once_and_a_vehicle_that_coasts_are_no_errors(
+    vehicle: Vehicle,
+) -> None:
+    """The pull leaps by a fifth of the weight, and is exactly 0 without the tool; with its torques off a vehicle slows down."""
+    beds = np.where(TIME % 40 > 20, 250.0, 0.0)
+    tooled = drive(vehicle, beds)
+    tooled["drawbar_force"] = np.where(beds > 0, tooled["drawbar_force"], 0.0)
+    assert notes(tooled, vehicle) == []
+    coasting = drive(vehicle, np.zeros(len(TIME)), coasting=(60, 60.6))
+    del coasting["drawbar_force"]
+    assert notes(coasting, vehicle) == []
