@@ -42,6 +42,8 @@ PAGES = (
     ("the vehicle pulls or climbs: no drive", "formats#what-the-motion-contradicts"),
     ("the wheels drive on as hard as before", "formats#what-the-motion-contradicts"),
     ("neither the motion nor another force answers", "formats#what-the-motion-contradicts"),
+    ("pull, which no wheel that pulls does:", "formats#what-the-motion-contradicts"),
+    ("its sign is wrong there, ", "formats#what-the-motion-contradicts"),
     ("while all other torques are not", "formats#what-the-motion-contradicts"),
     ("the logger hung, it seems", "formats#what-the-motion-contradicts"),
     ("while it keeps one value", "formats#what-the-motion-contradicts"),

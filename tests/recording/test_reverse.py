@@ -117,3 +117,13 @@ def test_a_drive_train_against_the_ground_speed_is_named() -> None:
     }
     table["wheel_based_speed"] = -columns["ground_speed"]
     assert "Against the direction of travel: wheel_based_speed." in said(table)
+
+
+def test_a_ground_speed_that_changes_its_sign_for_a_part_is_named() -> None:
+    """Backward at the speed that it drove forward, and not a word."""
+    right = drive(backward=False)
+    wrong = right | {"ground_speed": np.where(TIME > 200, -1.0, 1.0) * right["ground_speed"]}
+    assert unit_warnings(Recording.from_frame(right), machine()) == []
+    (note,) = unit_warnings(Recording.from_frame(wrong), machine())
+    assert note.startswith("ground_speed is negative from ")
+    assert "its sign is wrong there" in note

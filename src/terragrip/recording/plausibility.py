@@ -20,7 +20,7 @@ from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.reverse import against_warnings, reverse_warnings
-from terragrip.recording.rolling import RATIOS
+from terragrip.recording.rolling import RATIOS, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.torque_signs import sign_warnings
 from terragrip.recording.torques import torque_warnings
@@ -108,8 +108,14 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
         if known is None
         else zero_warnings(recording, known, means, thrusts) or leap_warnings(recording, known)
     )
+    slower = (
+        []
+        if known is None or speeds or sided or moved or frozen
+        else slower_warnings(recording, known, means, shown)
+    )
     notes = [
         *speeds,
+        *slower,
         *sided,
         *uneven,
         *_drive_warnings(recording),

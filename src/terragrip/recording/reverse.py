@@ -12,6 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
+from terragrip.recording.stretches import longest
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
 
 if TYPE_CHECKING:
@@ -63,6 +64,12 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     rim, speed = np.mean(list(rims.values()), axis=0), filled(time, ground)
     moving = _large(rim) & _large(speed)
     back = moving & (rim < 0)
+    slides = longest(time, moving & (rim > 0) & (speed < 0), np.ones(len(time), dtype=bool))
+    if slides:
+        return [
+            f"ground_speed is negative from {slides[0]:.4g} to {slides[1]:.4g} s while the wheels turn forward: its sign is wrong there, "
+            "unless the vehicle slid backward."
+        ]
     if not moving.any() or np.mean(speed[moving] < 0) > 1 - _ALIKE:
         return []
     if np.mean(back[moving]) >= _SHARE:

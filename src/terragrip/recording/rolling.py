@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.stretches import longest
 from terragrip.recording.turns import straight_rows
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
@@ -30,6 +31,7 @@ _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
 _PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
 _MOST = 0.75  # of the windows with such a thrust
 _RADII = 0.01  # radii that are known so well are right
+_SLOWER = 0.1  # of the hub's speed: radii are known to that
 
 
 def driven_radii(vehicle: Vehicle) -> dict[str, float]:
@@ -95,4 +97,42 @@ def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> l
     return [
         f"While the wheels pull, straight ahead, their rims go {slower:.1%} slower than the ground, which no wheel that pulls does: their "
         "radii are too small, or ground_speed too large. Check both; 'terragrip calibrate' finds the radii."
+    ]
+
+
+def slower_warnings(
+    recording: Recording, vehicle: Vehicle, means: Means | None, turn: Floats | None
+) -> list[str]:
+    """A sentence on rims that for a part of the drive go surely slower than their hubs while they pull; ``turn`` (n,) [rad/s]: by a
+    sensor, left positive. None: only straight ahead."""
+    if means is None:
+        return []
+    when = recording.time[0] + (np.flatnonzero(means.rows) + 0.5) * means.length
+    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+    yaw = np.zeros(len(when)) if turn is None else means.of(turn)
+    usable = straight if turn is None else np.isfinite(yaw)
+    sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
+    least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+    found: dict[str, tuple[float, float]] = {}
+    for wheel, radius in driven_radii(vehicle).items():
+        spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
+        if spin is None or torque is None:
+            continue
+        rim = radius * window_means(spin, means.place, means.count)[means.rows]
+        hub, thrust = means.speed - yaw * sides[wheel], means.of(torque) / radius
+        rows = (hub - rim > _SLOWER * hub) & (thrust > least) & usable
+        stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
+        if stretch:
+            found[wheel] = stretch
+    if not found:
+        return []
+    first, last = max(found.values(), key=lambda stretch: stretch[1] - stretch[0])
+    what = (
+        "ground_speed, or all wheels' speeds, are"
+        if len(found) == len(driven_radii(vehicle))
+        else "their speeds are"
+    )
+    return [
+        f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {_SLOWER:.0%} while they "
+        f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
     ]
