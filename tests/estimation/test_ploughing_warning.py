@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drives import drive, robot
+from drives import RADIUS, drive, robot
+from kernel_twin.immobilization import pace
 from terragrip.estimation import Estimates, estimate
+from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
 
 WORK, TURN, DIGS, STOPS = 10.0, 6.0, 115.0, 119.0
@@ -51,3 +53,25 @@ def test_stuck_comes_within_half_a_second_whatever_the_clock(rate: float, since:
     seen = np.ceil(stop * rate) / rate
     assert first == pytest.approx(seen + 1 / rate * (rate == 5), abs=0.01)
     assert first <= stop + 0.5
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "seconds", "memory"),
+    [(0.05, 0.2, 3.0, 6), (0.2, 0.05, 40.0, 96), (-0.1, -0.1, 3.0, 6)],
+)
+def test_more_slip_is_soon_usual_and_less_is_not(
+    before: float, after: float, seconds: float, memory: float
+) -> None:
+    """As docs/events.md has it, in units of time, and never faster than within the age of what was seen."""
+    unit = pace(robot(), watch_limits(RADIUS))
+    change = 130.0
+    usual = unseen_pull(lambda t: np.where(t < change, before, after), change + seconds, 10.0)[
+        "warning_usual_slip"
+    ]
+    expected = after + (before - after) * np.exp(-seconds / (memory * unit))
+    assert usual[-1] == pytest.approx(expected, abs=0.02)
+
+
+def test_stuck_comes_half_a_second_after_the_last_sample_that_shows_it_free() -> None:
+    first = begins(unseen_pull(lambda t: np.where(t < 20.05, 0.1, 0.99), 25.0, 8.0), "stuck")[0]
+    assert first == pytest.approx(20.0 + 0.5, abs=0.01)

@@ -82,6 +82,22 @@ def test_kernel_and_twin_say_the_same_of_every_row(drive: str, request: pytest.F
         np.testing.assert_allclose(np.array(points)[:, k], result[f"warning_{sign}"], atol=1e-9)
 
 
+@pytest.mark.parametrize("work", [0.15, 0.17])
+def test_kernel_and_twin_warn_in_the_same_row_of_a_slip_that_rises_slowly(work: float) -> None:
+    """From the slip at which the machine works, in 8 s to .7 more: what is surely beyond it decides, and not the score."""
+
+    def rises(t: Any) -> Any:
+        return work + 0.7 * np.clip((t - 20) / 8, 0, 1)
+
+    made = drive(24.0, rate=20.0, noise=0.3, slip=rises, speed=lambda t: 0.6 * (1 - rises(t))).recording
+    channels = {name: x for name, x in made.channels.items() if name != "drawbar_force"}
+    log, result = watched(Recording(made.time, channels))
+    limits = watch_limits(RADIUS)
+    watch = Watch(limits, pace(result.vehicle, limits), RADIUS)
+    events = [watch.update(row) for row in rows_of(result, np.isfinite(log["ground_speed"]))]
+    assert events.index("immobilization") == np.argmax(result["event"] == "immobilization")
+
+
 def test_a_warning_begins_above_its_limit_and_ends_below_half_of_it(
     table: tuple[Recording, Estimates],
 ) -> None:
