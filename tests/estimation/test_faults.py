@@ -161,16 +161,60 @@ def test_a_spike_among_the_first_rows_of_motion_is_one():
         assert np.abs(hit[name] - plain[name])[early:].max() < 0.1, name
 
 
-def test_torques_that_spike_together_but_not_alike_are_no_manoeuvre():
+@pytest.mark.parametrize(
+    ("leaps", "is_manoeuvre"),
+    [
+        ((80.0, 80.0, 80.0, 80.0), True),
+        ((80.0, 0.0, 80.0, 50.0), True),
+        ((80.0, 80.0, 0.0, 0.0), False),
+        ((80.0, 80.0, 20.0, 20.0), False),
+        ((80.0, 80.0, -80.0, -80.0), False),
+        ((100.0, -80.0, 15.0, 0.0), False),
+    ],
+)
+def test_torques_that_leap_as_most_others_do_are_a_manoeuvre(
+    leaps: tuple[float, ...], is_manoeuvre: bool
+) -> None:
+    """In one row, one way, and alike to a factor of two; else they are spikes."""
     base = drive(12.0).recording
-    spiked = base
-    for wheel, size in (("fl", 100.0), ("fr", -80.0), ("rl", 15.0)):
+    leapt = base
+    for wheel, size in zip(WHEELS, leaps, strict=True):
         name = f"drive_torque_{wheel}"
-        spiked = with_values(spiked, name, 700, base[name][700] + size)
+        leapt = with_values(leapt, name, 700, base[name][700] + size)
+    plain, hit = run(base), run(leapt)
+    moved = [np.abs(hit[f"adhesion_{w}"] - plain[f"adhesion_{w}"]).max() for w in WHEELS]
+    assert (hit["event"][700] == "outlier") != is_manoeuvre
+    assert max(moved) < 0.05
+
+
+def leaping(leap: float) -> Recording:
+    """10 Hz, and from row 100 on faster by so much [m/s]; half of g makes .5 from row to row."""
+    return drive(20.0, rate=10.0, speed=lambda t: 0.6 + leap * (t > 9.95)).recording
+
+
+@pytest.mark.parametrize(("leap", "is_possible"), [(0.3, True), (6.0, False)])
+def test_a_change_of_speed_that_a_vehicle_is_capable_of_is_no_spike(leap: float, is_possible: bool) -> None:
+    assert (run(leaping(leap))["event"][100] == "outlier") != is_possible
+
+
+@pytest.mark.parametrize(("leap", "pause", "is_possible"), [(1.0, 1.0, True), (6.0, 0.0, False)])
+def test_wheels_that_leap_together_are_followed_at_once_if_a_vehicle_can(
+    leap: float, pause: float, is_possible: bool
+) -> None:
+    """Within a pause of the logger [s]; the ground speed comes later."""
+    log = with_values(leaping(leap), "ground_speed", 100, np.nan)
+    result = run(delayed(log, 9.95, pause))
+    assert (abs(result["wheel_speed_fl"] - log["wheel_speed_fl"])[100] < 0.2) == is_possible
+
+
+def test_one_spike_does_not_hide_the_next() -> None:
+    """Of a wheel at 5 Hz; what it may do from row to row is no measure of its noise."""
+    base = drive(20.0, rate=5.0).recording
+    rows = [50, 52, 54]
+    spiked = with_values(base, "wheel_speed_fr", rows, base["wheel_speed_fr"][rows] + 8.0)
     plain, hit = run(base), run(spiked)
-    assert hit["event"][700] == "outlier"
-    for wheel in WHEELS:
-        assert np.abs(hit[f"adhesion_{wheel}"] - plain[f"adhesion_{wheel}"]).max() < 0.05
+    assert (hit["event"][rows] == "outlier").all()
+    assert np.abs(hit["adhesion_fr"] - plain["adhesion_fr"]).max() < 0.1
 
 
 def test_clean_data_has_hardly_an_outlier():
