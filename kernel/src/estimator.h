@@ -221,7 +221,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real pulls[8], share;        /* wheel: 1 where driven; 1 over their number */
     tg_real inverse_radius[8];      /* wheel, of the rolling radius */
     tg_real at_rest[8];             /* wheel: its share of the driven wheels' load at rest */
-    tg_real watched_share[8], work;       /* wheel: its share of the load of those watched; their share of the driven wheels' */
+    tg_real watched_share[8], work; /* wheel: its share of the load of those watched; their share of the driven wheels' */
     tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */
 } tgi_constants;
 

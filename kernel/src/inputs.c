@@ -33,9 +33,9 @@ static void begin(tg_hold *h, tg_real x, tg_real noise)
 
 /* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
  * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
- * it enters the mean square clipped. `rate`: the change a second that is no spike, but after a gap: nearly everything is possible within
- * it, and one sample is soon confirmed. Where it is known, the increments before need not be. `moving`: else the increments are those of
- * a standstill, which show nothing of the start. */
+ * it enters the mean square clipped. `rate`: the change a second that is no spike, 0 where it is not known; it counts over the usual interval
+ * at most, since within a gap nearly everything is possible. Where it is known, a spike is one from the first samples on, else only once
+ * the increments are known. `moving`: else the increments are those of a standstill, which show nothing of the start. */
 void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
                      int32_t moving)
 {

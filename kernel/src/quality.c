@@ -92,7 +92,8 @@ tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
     return f->value;
 }
 
-/* Whether the speed of wheel `place`, or behind the wheels of the ground, was measured lately enough to say how the vehicle moves. */
+/* Whether the speed of wheel `place`, or that of the ground where `place` is the number of wheels, was measured lately enough to say how the
+ * vehicle moves. */
 int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time)
 {
     const int32_t wheel = place < e->settings.machine.wheels;

@@ -38,7 +38,8 @@ static void disturb(const tg_tuned *k, const tg_real *x, tg_real (*P)[SIZE], tg_
     }
 }
 
-/* What separates ground speed and slip speeds is reckoned: between them goes any acceleration, up to half of that, and no rim shows it. */
+/* Where the ground speed is reckoned, it and all slip speeds may have changed against each other by up to half of `change` [m/s] either way:
+ * no rim shows it. */
 static void loosen(tg_real (*P)[SIZE], tg_real change, int32_t n)
 {
     const tg_real added = tgi_square(change) / 12;

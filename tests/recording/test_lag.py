@@ -96,6 +96,14 @@ def test_a_vehicle_that_digs_in_before_its_wheels_are_stopped_has_no_early_groun
     assert lag is None or not lag.is_of_the_clock
 
 
+@pytest.mark.parametrize("spinning", [1.0, 2.0])
+def test_a_vehicle_whose_wheels_spin_before_it_starts_has_no_late_ground_speed(spinning: float) -> None:
+    """The same run backward: its losses of speed show no lag."""
+    part = TIME < 45
+    lag = lag_within(TIME[part], {n: x[part][::-1] for n, x in stopped_log(0.0, spinning).items()})
+    assert lag is None or not lag.is_of_the_clock
+
+
 @pytest.mark.parametrize("late", [-1.5, 0.7, 1.5])
 def test_a_late_clock_is_off_in_gains_and_losses_of_speed_alike(late: float) -> None:
     lag = lag_within(TIME, stopped_log(late, 0.0))

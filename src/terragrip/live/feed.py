@@ -41,7 +41,7 @@ class Feed:
         self.after = after  # newest stamp that the record holds: a replay goes on behind it
         self.messages = self.unreadable = 0
         self.is_lost = False
-        self._excuse, self._excused = "", float("-inf")
+        self._excuse, self._excuse_time = "", float("-inf")  # why nothing comes although the other side sends
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
         self._unpack = unpack
         self._last_events: dict[str, float] = {}
@@ -125,11 +125,11 @@ class Feed:
 
     def excuse(self, why: str) -> None:
         """The other side has just sent something that holds no sample: ``why``; empty: it held one."""
-        self._excuse, self._excused = why, self.inbox.clock()
+        self._excuse, self._excuse_time = why, self.inbox.clock()
 
     def excuse_at(self, now: float) -> str:
         """Why nothing comes although the other side sends; empty where it does not."""
-        return self._excuse if now - self._excused < _EVERY else ""
+        return self._excuse if now - self._excuse_time < _EVERY else ""
 
     def connected(self, how: str = "connected again") -> None:
         """The source has its other side (again)."""

@@ -30,7 +30,7 @@ _STRAIGHT = 0.05  # of an axle's rims from side to side
 _SLIP = 0.02  # less is of the size of the radii's errors,
 _RADII = 0.01  # which are a like share of the slip, and so of the adhesion
 _UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' trodden track
-_RESTORED = 0.4  # of the difference, at most, is left when the masses are exchanged
+_RESTORED = 0.4  # of the difference, at most, is left when what was exchanged is put right
 
 
 def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
@@ -53,6 +53,11 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
     if rows.sum() < _LEAST:
         return []
     pulls = _pulls(recording, vehicle, means, total)
+
+    def beyond(forces: dict[int, Floats], masses: Floats, slope: float, pair: tuple[int, int]) -> list[float]:
+        of = [_difference(forces, vehicle, masses, means, pull, rows, pair) for pull in pulls]
+        return [_beyond(one, slope) for one in of]
+
     for a, b in combinations(driven, 2):
         slips = [median(slip[k][rows]) for k in (a, b)]
         if min(slips) < _SLIP:
@@ -61,13 +66,6 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         moved = {**thrust, a: thrust[b], b: thrust[a]}
         exchanged = vehicle.axle_mass.copy()
         exchanged[[a, b]] = exchanged[[b, a]]
-
-        def beyond(
-            forces: dict[int, Floats], masses: Floats, slope: float, pair: tuple[int, int]
-        ) -> list[float]:
-            of = [_difference(forces, vehicle, masses, means, pull, rows, pair) for pull in pulls]
-            return [_beyond(one, slope) for one in of]
-
         off = beyond(thrust, vehicle.axle_mass, steepest, (a, b))
         least, uneven = min(off, key=abs), _UNEVEN + _RADII / min(slips)
         if min(off) * max(off) <= 0 or abs(least) <= uneven:
