@@ -21,6 +21,7 @@ _PINT_NAMES = {
     "°": "degree",
     "Grad": "degree",
     "kp": "kgf",
+    "lbm": "lb",
 }
 MOMENTS = {
     "Nm": 1.0,
@@ -65,6 +66,7 @@ def test_table_agrees_with_pint(symbol: str) -> None:
         ("1 lb-ft", "N m", 1.3558179483314),
         ("1 ft.lb", "N m", 1.3558179483314),
         ("1 kg m", "N m", 9.80665),
+        ("1 lbm", "kg", 0.45359237),
         *((f"1 {unit}", "N m", size) for unit, size in MOMENTS.items()),
         ("90 Grad", "rad", 1.57079632679),
         ("10 kn", "m/s", 5.14444444444),

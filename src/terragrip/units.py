@@ -17,7 +17,7 @@ STANDARD_GRAVITY = 9.80665  # m/s², exact by definition (CGPM 1901)
 _ONE: Dimension = (0, 0, 0, 0)
 _BASE: dict[str, tuple[float, Dimension]] = {
     "kg": (1.0, (1, 0, 0, 0)), "g": (1e-3, (1, 0, 0, 0)), "t": (1e3, (1, 0, 0, 0)),
-    "lb": (0.45359237, (1, 0, 0, 0)), "lbs": (0.45359237, (1, 0, 0, 0)),
+    "lb": (0.45359237, (1, 0, 0, 0)), "lbs": (0.45359237, (1, 0, 0, 0)), "lbm": (0.45359237, (1, 0, 0, 0)),
     "m": (1.0, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)),
     "cm": (1e-2, (0, 1, 0, 0)), "mm": (1e-3, (0, 1, 0, 0)),
     "l": (1e-3, (0, 3, 0, 0)), "L": (1e-3, (0, 3, 0, 0)),
@@ -46,8 +46,8 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "kt": (1852 / 3600, (0, 1, -1, 0)), "kts": (1852 / 3600, (0, 1, -1, 0)),
     "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
 }  # fmt: skip
-_MOMENT = re.compile(r"^([kmM]?N|daN|kgf?|kp|lbf?)(mm?|cm|ft|in)$")
-"""A force, or a mass for its weight, and the length of its lever, written together: Nm, daNm, kgm, lbft."""
+_MOMENT = re.compile(r"^(?!lbm$)([kmM]?N|daN|kgf?|kp|lbf?)(mm?|cm|ft|in)$")
+"""A force, or a mass for its weight, and the length of its lever, written together: Nm, daNm, kgm, lbft. lbm is a pound of mass."""
 _SUPERSCRIPTS = str.maketrans(
     {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
 )
