@@ -127,3 +127,21 @@ def test_a_ground_speed_that_changes_its_sign_for_a_part_is_named() -> None:
     (note,) = unit_warnings(Recording.from_frame(wrong), machine())
     assert note.startswith("ground_speed is negative from ")
     assert "its sign is wrong there" in note
+
+
+@pytest.mark.parametrize(("rim", "ground"), [(1.0, -0.05), (-0.05, 1.0)])
+def test_wheels_that_spin_as_it_slips_back_or_lock_as_it_slides_have_no_wrong_sign(
+    rim: float, ground: float
+) -> None:
+    """In four fifths of the log; m/s."""
+    ahead = TIME > 240
+    columns = {"time": TIME, "ground_speed": np.where(ahead, 1.0, ground)}
+    columns |= {wheel: np.where(ahead, 1.05, rim) / RADIUS for wheel in WHEELS}
+    assert "Against" not in said(columns)
+
+
+def test_wheels_against_a_receiver_that_measures_in_rows_of_its_own_are_named() -> None:
+    columns, own = pulled(), np.arange(len(TIME)) % 5 == 0
+    columns["ground_speed"] = np.where(own, columns["ground_speed"], np.nan)
+    columns |= {wheel: np.where(own, np.nan, -columns[wheel]) for wheel in WHEELS}
+    assert "Against the direction of travel" in said(columns)
