@@ -145,6 +145,7 @@ def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> 
         r"The positions lie 1633 m apart, where ground and wheels drove 30\.07 m: time may not be in seconds",
         note,
     )
+    assert "unit: min}" in note
 
 
 def test_a_machine_that_was_carried_away_while_the_logger_was_off_is_no_clock_in_another_unit() -> None:
