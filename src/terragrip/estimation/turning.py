@@ -32,7 +32,7 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track 
     if not any(rim.side or rim.ahead for rim in rims):
         return None, []
     if YAW_RATE in channels:
-        return None, _unseen_turns(sample, rims) if _falls_silent(sample) else []
+        return None, _unseen_turns(sample, rims)
     track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
     if track is not None and np.isfinite(track.turn).any():
         return track, ["The rate of turn is that of the positions."]
@@ -47,14 +47,8 @@ def _positions(log: LogBlocks) -> Recording:
     return Recording(time, dict(zip(names, columns, strict=True)))
 
 
-def _falls_silent(log: Recording) -> bool:
-    """Whether the yaw rate is missing for longer than a window: after a second the estimator takes the drive for straight."""
-    measured = log.time[np.isfinite(log.channels[YAW_RATE])]
-    return bool(np.any(np.diff(np.r_[log.time[:1], measured, log.time[-1:]]) > _WINDOW))
-
-
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
-    """A sentence on a rate of turn that is missing."""
+    """A sentence on a rate of turn that is missing, or silent: after a second without it the estimator takes the drive for straight."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
     names = [*(rim.channel for rim in rims), *([YAW_RATE] if YAW_RATE in log.channels else [])]
