@@ -14,6 +14,7 @@ import pytest
 import scipy.io
 
 from terragrip.formats import inspect, read
+from terragrip.formats.matlab_signals import Contents, walk
 from terragrip.formats.reading import read_table
 from test_logs import COUNT, SPEED, TIME
 
@@ -188,6 +189,32 @@ def test_the_export_of_dspace_controldesk(tmp_path: Path, version: str) -> None:
     np.testing.assert_allclose(recording.time[known], TIME[::10] - TIME[0])
     np.testing.assert_allclose(recording["ground_speed"][known], SPEED[::10])
     np.testing.assert_allclose(recording["wheel_speed_l"], SPEED * np.pi)
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [
+        {"X": [{"Data": TIME}]},
+        {"X": [{"Data": TIME}], "Y": SPEED},
+        {"X": [{"Data": SPEED[0]}], "Y": [{"Name": "y", "Data": SPEED, "XIndex": np.array([1])}]},
+    ],
+)
+def test_structs_that_only_resemble_controldesks_are_read_as_any_other(beside: dict[str, Any]) -> None:
+    contents = Contents()
+    walk({"rec": {"t": TIME, "v": SPEED, **beside}}, "", contents, 0)
+    assert "rec.v" in contents.signals
+
+
+@pytest.mark.parametrize(("index", "clock"), [(None, 0), (1, 0), (2, 1), (0, None), (3, None)])
+def test_the_time_vector_of_a_controldesk_signal_is_that_of_its_number_or_the_first(
+    index: int | None, clock: int | None
+) -> None:
+    contents, clocks = Contents(), [TIME, TIME + 0.05]
+    signal = {"Data": SPEED} | ({} if index is None else {"XIndex": np.array([index])})
+    walk({"rec": {"X": [{"Data": one} for one in clocks], "Y": [signal]}}, "", contents, 0)
+    assert list(contents.signals) == ([] if clock is None else ["rec.Y[0]"])
+    given = [contents.signals[name][0] for name in contents.signals]
+    assert [id(one) for one in given] == ([] if clock is None else [id(clocks[clock])])
 
 
 def structs(parts: list[dict[str, Any]]) -> np.ndarray:
