@@ -47,7 +47,7 @@ def test_a_torque_or_a_pull_that_is_repeated_is_named(name: str) -> None:
     values[rows] = values[rows][0]
     (note,) = frozen_warnings(pulling(**{name: values}))
     assert note.startswith(f"{name} repeats")
-    assert "from 20 to 30 s while other torques change" in note
+    assert "from 20 to 30 s while other forces change" in note
 
 
 def test_a_torque_at_its_limit_and_an_axle_that_is_off_are_left_alone() -> None:
@@ -117,3 +117,18 @@ def test_a_spoiled_value_is_no_change_of_another_speed() -> None:
     assert frozen_warnings(steady) == []
     columns["wheel_speed_l"][300] = 1e30
     assert frozen_warnings(log(**columns)) == []
+
+
+def test_a_load_cell_at_its_limit_torques_that_freeze_together_and_an_accelerometer_are_named() -> None:
+    """Soil resistance was .17 off behind a cell that ended at its limit in all of the log, .06 behind an accelerometer that froze."""
+    drive = pulling().channels
+    rows = (TIME >= 20) & (TIME <= 30)
+    limited = drive["drawbar_force"].copy()
+    limited[rows | (limited > limited[rows][0])] = limited[rows][0]
+    (note,) = frozen_warnings(pulling(drawbar_force=limited))
+    assert note.startswith(f"drawbar_force repeats {limited[rows][0]:.4g} from ")
+    torques = {n: np.where(rows, drive[n][rows][0], drive[n]) for n in ("drive_torque_l", "drive_torque_r")}
+    assert [note.split(" repeats")[0] for note in frozen_warnings(pulling(**torques))] == list(torques)
+    acceleration = np.where(rows, drive["acceleration_x"][rows][0], drive["acceleration_x"])
+    (note,) = frozen_warnings(pulling(acceleration_x=acceleration))
+    assert note.startswith("acceleration_x repeats")

@@ -49,13 +49,14 @@ def frozen_warnings(recording: Recording) -> list[str]:
             speeds[one] for one in (["ground_speed"] if name != "ground_speed" else rims) if one in speeds
         ]
         notes += _repeats(name, recording.time, speeds[name], others)
-    torques = {n: v for n, v in recording.channels.items() if n.startswith("drive_torque_")}
-    for name, values in torques.items():
-        others = [other for one, other in torques.items() if one != name]
+    forces = {
+        n: v for n, v in recording.channels.items() if n.startswith("drive_torque_") or n == "drawbar_force"
+    }
+    for name, values in forces.items():
+        others = [other for one, other in forces.items() if one != name]
         notes += _repeats(name, recording.time, values, others, forces=True)
-    if "drawbar_force" in recording.channels:
-        pull = recording.channels["drawbar_force"]
-        notes += _repeats("drawbar_force", recording.time, pull, list(torques.values()), forces=True)
+    if acceleration is not None:
+        notes += _repeats("acceleration_x", recording.time, acceleration, _metric(speeds))
     return notes + _hung(recording)
 
 
@@ -125,7 +126,7 @@ def _repeats(
             ]
         )
     usable = what[first] != 0.0
-    if forces:
+    if forces and name != "drawbar_force":  # a motor is held at its limit, a load cell never
         usable &= (what[first] > what.min()) & (what[first] < what.max())
     long = (lasting >= max(LONG, _TIMES * usual)) & usable
     found = [
@@ -139,8 +140,8 @@ def _repeats(
     return [
         f"{name} repeats {value:.4g} from {start:.4g} to {start + seconds:.4g} s"
         + (f", and {len(found) - 1} times more," if len(found) > 1 else "")
-        + f" while other {'torques' if forces else 'speeds'} change: not measured, it seems. Leave these cells empty: the intervals "
-        "then show how little is known."
+        + f" while other {'forces' if forces else 'speeds' if 'speed' in name else 'channels'} change: not measured, it seems. Leave "
+        "these cells empty: the intervals then show how little is known."
     ]
 
 
