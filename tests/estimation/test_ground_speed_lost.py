@@ -66,6 +66,28 @@ def test_without_torques_as_well(rate: float, speed: Any) -> None:
     assert np.isin(estimates["event"][silent], ["gap", "standstill"]).all()
 
 
+def test_without_torques_backward_is_the_mirror_image() -> None:
+    made = drive(100.0, rate=20.0, slip=soils)
+    log = {name: v for name, v in made.recording.channels.items() if "torque" not in name}
+    ahead, _ = lost(replace(made, recording=replace(made.recording, channels=log)), end=90.0)
+    log = {name: -v for name, v in log.items()}
+    back, _ = lost(replace(made, recording=replace(made.recording, channels=log)), end=90.0)
+    moves = made.recording.time > 1.0
+    np.testing.assert_allclose(back["ground_speed"][moves], -ahead["ground_speed"][moves], atol=1e-6)
+    np.testing.assert_allclose(back["slip_fl"][moves], ahead["slip_fl"][moves], atol=1e-6)
+
+
+def test_before_the_first_ground_speed_no_slip_is_taken_for_known() -> None:
+    """Without torques; the slip that a drive begins with is no measurement."""
+    made = drive(20.0, rate=20.0)
+    log = {name: v for name, v in made.recording.channels.items() if "torque" not in name}
+    early = made.recording.time < 15
+    log["ground_speed"] = np.where(early, np.nan, log["ground_speed"])
+    estimates = estimate(replace(made.recording, channels=log), robot())
+    assert estimates["slip_fl_std"][early].min() > 0.25
+    assert (estimates["event"][early] == "gap").all()
+
+
 @pytest.mark.parametrize("imu", [True, False])
 def test_wheels_that_spin_as_it_goes_do_not_spin_for_the_rest(imu: bool) -> None:
     """As usual they slip .1; when the sensor goes, .7 for 3 s."""
