@@ -433,3 +433,13 @@ def test_an_input_that_comes_late_does_not_start_the_filter_anew(late: float) ->
         assert "restart" not in set(estimates["event"])
         after = estimates.time > late + 8
         assert np.sqrt(np.mean((estimates["adhesion_rl"] - made.truth["adhesion_rl"])[after] ** 2)) < 0.05
+
+
+def test_backwards_a_turn_is_the_mirror_image_too() -> None:
+    """Slips are along the hubs' ways, in reverse too: what they tell of unseen loads is in the intervals."""
+    log = drive(20.0, rate=20.0).recording.with_channels(angular_velocity_z=0.4 * np.sin(np.arange(400) / 30))
+    back = Recording(log.time, {name: -values for name, values in log.channels.items()})
+    flat = robot(center_of_gravity_height=0.0, hitch_height=0.0)
+    ahead, mirrored = (estimate(one, flat) for one in (log, back))
+    for name in ("slip_fl", "adhesion_fl_std", "soil_resistance_std"):
+        np.testing.assert_allclose(mirrored[name][40:], ahead[name][40:], atol=1e-4, err_msg=name)
