@@ -115,6 +115,23 @@ static tg_real usual_slip(const tg_estimator *e, tg_real before)
     return place * mean / (1 - bend);
 }
 
+/* A step along the curve as big as this, over what a line would make of it: one through the origin, A s/(s + c), whose tangent is `bend`
+ * of its secant, has its tangent reach the asymptote at secant/(1 - bend) (docs/decisions/0163). Wheels that spin at a start slip
+ * farther. */
+static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
+
+/* What is left of a step in slip where one wheel is far from the wheels' mean slip, for longer than unevenness lasts: it may be past the
+ * peak of its curve, where slip tells nothing of the load. One for all wheels, so that thrust stays. */
+static tg_real left_by_spin(const tg_estimator *e)
+{
+    const tgi_constants *c = &e->constants;
+    const tg_tuned *k = &e->settings.tuned;
+    tg_real mean = 0, far = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->watched_share[i] * e->warped.wheel_slip[i];
+    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->watched_share[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.wheel_slip[i] - mean)) : far;
+    return 1 / tgi_square(beyond_line(k, far, c->work / tgi_max(e->warped.slipping, k->least_slip)));
+}
+
 /* Slips as if the vehicle did not turn: what a turn does is a trend, and a gyroscope's noise is none. */
 static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travelled, tg_real gain)
 {
@@ -136,6 +153,7 @@ static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travell
     const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* a spinning wheel's slip tells nothing of radii and ruts */
     w->sure = w->sure > 0 ? w->sure + gain * (sure - w->sure) : sure;
     const tg_real learned = gain * sure / w->sure;
+    const tg_real counts = gain * weight * tgi_square(left_by_spin(e)); /* a mean square holds what is left of a step, squared */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
         w->usual[i] += learned * beyond;
@@ -144,9 +162,9 @@ static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travell
         pull += c->at_rest[i] * e->belief.x[i];
         w->wheel_slip[i] += fresh * (slips->along[i] - w->wheel_slip[i]);
     }
-    w->square += weight * gain * (square * c->share - w->square);
-    w->noise += weight * gain * (noise - w->noise);
-    w->level += weight * gain * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
+    w->square += counts * (square * c->share - w->square);
+    w->noise += counts * (noise - w->noise);
+    w->level += counts * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
     w->pulling += fresh * (pull - w->pulling);
     w->slipping = usual_slip(e, w->slipping);
 }
@@ -162,22 +180,6 @@ void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg
     else memset(w->slip, 0, sizeof w->slip);
 }
 
-/* A step along the curve as big as this, over what a line would make of it: one through the origin, A s/(s + c), whose tangent is `bend`
- * of its secant, has its tangent reach the asymptote at secant/(1 - bend) (docs/decisions/0163). Wheels that spin at a start slip
- * farther. */
-static tg_real beyond_line(const tg_tuned *k, tg_real slip, tg_real inverse) { return tgi_max((1 - k->bend) * slip * inverse, 1); }
-
-/* How far from the wheels' mean slip one of them is, for longer than unevenness lasts: it may be past the peak of its curve, where slip
- * tells nothing of the load. */
-static tg_real farthest_wheel(const tg_estimator *e)
-{
-    const tgi_constants *c = &e->constants;
-    tg_real mean = 0, far = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->watched_share[i] * e->warped.wheel_slip[i];
-    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->watched_share[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.wheel_slip[i] - mean)) : far;
-    return far;
-}
-
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
  * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
  * those slips relative to the wheels' slip in the same rows (at most 1), since a load moves a small slip by little and a large one by
@@ -188,10 +190,9 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
     const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
-    const tg_real spun = beyond_line(k, farthest_wheel(e), inverse * e->constants.work); /* one for all wheels, likewise below: thrust stays */
     tg_real lasting = 0, farthest = 0;
     for (int i = 0; i < TG_MAX_WHEELS; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
-    const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) / tgi_square(spun);
+    const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * left_by_spin(e);
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;

@@ -170,17 +170,31 @@ def test_what_a_wheel_slipped_while_it_spun_is_not_its_usual() -> None:
         assert np.mean(estimates[f"adhesion_{wheel}_std"][late]) < 0.4 * np.mean(true)
 
 
-def test_a_wheel_that_spins_alone_does_not_move_the_adhesions() -> None:
-    """At the torque that it had one wheel spins, past its curve's peak: no load has shifted, and each wheel's force is what it was."""
-    plain = drive(30.0)
+def spinning_alone(plain: Drive) -> Drive:
+    """From 20 to 25 s one wheel spins at the torque that it had, past its curve's peak."""
     time, channels = plain.recording.time, dict(plain.recording.channels)
     speed = channels["wheel_speed_fl"]
     channels["wheel_speed_fl"] = speed * np.where((time > 20) & (time < 25), 10.0, 1.0)
     channels["drive_torque_fl"] = channels["drive_torque_fl"] + RADIUS * BEARING * (
         channels["wheel_speed_fl"] - speed
     )
-    estimates = estimate(replace(plain.recording, channels=channels), robot())
+    return replace(plain, recording=replace(plain.recording, channels=channels))
+
+
+def test_a_wheel_that_spins_alone_does_not_move_the_adhesions() -> None:
+    """No load has shifted, and each wheel's force is what it was."""
+    made = spinning_alone(drive(30.0))
+    estimates, time = estimate(made.recording, robot()), made.recording.time
     spinning = (time > 21) & (time < 25)
     for wheel in WHEELS:
-        true = plain.truth[f"adhesion_{wheel}"][spinning]
+        true = made.truth[f"adhesion_{wheel}"][spinning]
         assert np.mean(np.abs(estimates[f"adhesion_{wheel}"][spinning] - true)) < 0.3 * np.mean(true)
+
+
+def test_a_wheel_that_spun_alone_does_not_widen_the_rest_of_the_log() -> None:
+    """What its slip hid of loads while it spun says nothing of loads once it grips."""
+    made = spinning_alone(drive(40.0))
+    estimates, late = estimate(made.recording, robot()), made.recording.time > 28
+    for wheel in WHEELS:
+        true = made.truth[f"adhesion_{wheel}"][late]
+        assert np.mean(estimates[f"adhesion_{wheel}_std"][late]) < 0.3 * np.mean(true)
