@@ -14,11 +14,11 @@ from terragrip.estimation.engine_torque import (
     EngineTorque,
     driveline_torque,
     earlier,
-    has_engine_torque,
     held,
 )
 from terragrip.physics.driveline import torque_spread
 from terragrip.physics.efficiency import tractive_efficiency
+from terragrip.recording.schema import has_engine_torque
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_parts import Driveline
 
