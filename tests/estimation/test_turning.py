@@ -60,7 +60,7 @@ def test_a_gyroscope_that_falls_silent_is_said(measured: Callable[[Floats], Bool
     turn = np.where(log.time % 40 > 30, np.pi / 10, 0.0) * np.where(log.time % 80 > 40, 1, -1)
     turn = np.where(measured(log.time), np.convolve(turn, np.ones(10) / 10, "same"), np.nan)
     estimates = tg.estimate(without(log, *POSITIONS).with_channels(angular_velocity_z=turn), machine())
-    assert any("no signal shows how fast the machine turned" in note for note in estimates.notes) is said
+    assert any("Log the yaw rate throughout" in note for note in estimates.notes) is said
 
 
 @pytest.mark.parametrize(

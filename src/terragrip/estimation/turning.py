@@ -62,9 +62,10 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     share = float(np.mean(turning[moving])) if moving.any() else 0.0
     if share < _MUCH:
         return []
+    advice = "Log the yaw rate throughout" if YAW_RATE in log.channels else "Give a yaw rate, or positions"
     return [
         f"The rims of left and right differ in {share:.0%} of the driving, where no signal shows how fast the machine turned: the slips of "
-        "both sides are wrong there. Give a yaw rate, or positions."
+        f"both sides are wrong there. {advice}."
     ]
 
 
