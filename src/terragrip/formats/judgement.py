@@ -84,9 +84,10 @@ class Judge:
         column = self._columns[candidate.column]
         values = self._numbers[candidate.column]
         known = values[np.isfinite(values)]
-        own = candidate.score == 1.0 or candidate.channel in _CONSTANTS
+        own = candidate.score == 1.0
+        may_be_constant = own or candidate.channel in _CONSTANTS
         if not len(known) or (
-            not own
+            not may_be_constant
             and len(known) > 2
             and not known.max() > known.min()
             and not self._may_stand(candidate, known)
@@ -124,7 +125,7 @@ class Judge:
                 )
         if len(known) < 3 and not own:
             guess = replace(guess, doubt=f"{len(known)} value{'s' * (len(known) > 1)} only")
-        elif not own and not known.max() > known.min():
+        elif not may_be_constant and not known.max() > known.min():
             guess = replace(guess, confidence=0.6 * guess.confidence, doubt=f"is {known[0]:.4g} throughout")
         return guess
 
