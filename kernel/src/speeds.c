@@ -166,12 +166,12 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
     tgi_watch_innovation(e, row, ahead, square - tgi_square(ahead) + in->variance[0]);
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) sum += s->probability[m] = tgi_exp(fit[m].score - best);
     s->manoeuvre = s->slipping = 0;
-    const int32_t measured = row->reckoned ? 1 : 0; /* the first of them: the ground speed comes first, and a reckoned one is no measurement */
+    const int32_t first = row->reckoned; /* of the measurements: the ground speed comes first, and a reckoned one is none */
     for (int32_t m = 0; m < TG_SPEED_MODES; m++) {
         const tg_real p = s->probability[m] /= sum;
         s->manoeuvre += p * tuned->manoeuvre[m / TG_LEVELS];
         s->slipping += p * tuned->slipping[m % TG_LEVELS];
-        for (int32_t k = measured; k < in->count; k++) {
+        for (int32_t k = first; k < in->count; k++) {
             const int32_t c = in->given[k], place = c ? c - 1 : n; /* ground speed is first here, after the wheels elsewhere */
             if (m == 0) row->channel_nis[place] = 0;
             row->channel_nis[place] += p * fit[m].nis[c];
@@ -179,8 +179,8 @@ static void step(tg_estimator *e, tg_real dt, tgi_speed_samples *in, tg_row *row
             weight[k] += p * fit[m].weight[c];
         }
     }
-    for (int32_t k = measured; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
-    if (!isnan(in->y[0]) && !measured) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0;
+    for (int32_t k = first; k < in->count; k++) row->outlier |= weight[k] < e->settings.outlier_weight;
+    if (!isnan(in->y[0]) && !row->reckoned) s->off = in->confirmed || weight[0] < e->settings.outlier_weight ? side : 0;
     merge(s, e->speed_mode, size);
 }
 

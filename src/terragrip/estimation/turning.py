@@ -14,7 +14,7 @@ from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
 
-YAW_RATE = "angular_velocity_z"
+_YAW_RATE = "angular_velocity_z"
 _CALM = 4.0  # s over which a yaw rate is taken from positions
 _MOVING = 0.1  # m/s
 _WINDOW = 2.0  # s
@@ -31,7 +31,7 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track 
     rims = rims_of(vehicle, channels)
     if not any(rim.side or rim.ahead for rim in rims):
         return None, []
-    if YAW_RATE in channels:
+    if _YAW_RATE in channels:
         return None, _unseen_turns(sample, rims)
     track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
     if track is not None and np.isfinite(track.turn).any():
@@ -51,18 +51,18 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     """A sentence on a rate of turn that is missing, or silent: after a second without it the estimator takes the drive for straight."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
-    names = [*(rim.channel for rim in rims), *([YAW_RATE] if YAW_RATE in log.channels else [])]
+    names = [*(rim.channel for rim in rims), *([_YAW_RATE] if _YAW_RATE in log.channels else [])]
     speeds = {name: log.channels[name] for name in names}
     calm = averaged(replace(log, channels=speeds, labels={}), _WINDOW).channels
     left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], calm) for sign in (1, -1))
     with np.errstate(invalid="ignore"):
         mean = np.abs(left + right) / 2
         moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
-    turning &= np.isnan(calm.get(YAW_RATE, np.nan))
+    turning &= np.isnan(calm.get(_YAW_RATE, np.nan))
     share = float(np.mean(turning[moving])) if moving.any() else 0.0
     if share < _MUCH:
         return []
-    advice = "Log the yaw rate throughout" if YAW_RATE in log.channels else "Give a yaw rate, or positions"
+    advice = "Log the yaw rate throughout" if _YAW_RATE in log.channels else "Give a yaw rate, or positions"
     return [
         f"The rims of left and right differ in {share:.0%} of the driving, where no signal shows how fast the machine turned: the slips of "
         f"both sides are wrong there. {advice}."

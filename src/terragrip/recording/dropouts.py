@@ -13,6 +13,7 @@ from terragrip.recording.lag import measured
 from terragrip.recording.mechanics import PULL, Means
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import DRIVING, LONG, is_one_value, longest, may_last
 from terragrip.units import STANDARD_GRAVITY
 
@@ -87,7 +88,7 @@ def _zeros(recording: Recording, means: Means, left: Floats, names: list[str]) -
 
 def _wheels(recording: Recording) -> list[str]:
     """A sentence on wheels that read 0 for long while the ground speed goes on."""
-    rims = [n for n in recording.channels if n == "wheel_based_speed" or n.startswith("wheel_speed_")]
+    rims = rim_names(recording.channels)
     ground, notes = recording.channels.get("ground_speed"), []
     if ground is None or len(rims) < 2 or not np.isfinite(ground).any():
         return []
@@ -122,9 +123,7 @@ def _drives(speed: Floats) -> Bools:
 
 def _ground(recording: Recording) -> list[str]:
     """A sentence on a ground speed that reads 0 for long while all wheels go on."""
-    rims = [
-        v for n, v in recording.channels.items() if n == "wheel_based_speed" or n.startswith("wheel_speed_")
-    ]
+    rims = [recording.channels[name] for name in rim_names(recording.channels)]
     ground = recording.channels.get("ground_speed")
     if (
         ground is None

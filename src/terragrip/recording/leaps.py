@@ -49,13 +49,16 @@ class _Drive:
         """The mean of a channel (n + 1,) over `LONG` after each instant less that before it."""
         steps = np.diff(self.time)
         area = np.r_[0.0, np.cumsum(steps * (values[1:] + values[:-1]) / 2)]
-        at = [np.interp(self.middle + k * LONG, self.time, area) for k in (-1, 0, 1)]
-        return np.asarray((at[2] - 2 * at[1] + at[0]) / LONG)
+        return self._bend(area)
 
     @property
     def motion(self) -> Floats:
         """The same of the change of ground speed."""
-        at = [np.interp(self.middle + k * LONG, self.time, self.speed) for k in (-1, 0, 1)]
+        return self._bend(self.speed)
+
+    def _bend(self, values: Floats) -> Floats:
+        """The slope of values (n + 1,) over `LONG` after each instant less that before it."""
+        at = [np.interp(self.middle + k * LONG, self.time, values) for k in (-1, 0, 1)]
         return np.asarray((at[2] - 2 * at[1] + at[0]) / LONG)
 
 

@@ -14,6 +14,7 @@ from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import gaps
 from terragrip.recording.turns import filled
+from terragrip.units import factor_to
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -25,7 +26,7 @@ _OFTEN = 0.99  # of the changes are slower (right logs: by 2.5 m/s² at most, co
 _ENOUGH = 4000  # rows that are examined
 _OUTRUN = 3.0  # the positions' spread over the way driven
 _SPREAD = 20.0  # m
-_LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # s
+_LONGER = ("min", "h", "d")
 
 _PART = 1200.0  # s of the log at most, in which the speeds' lag counts as one
 _DRIFT, _CERTAIN = (
@@ -66,7 +67,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 def _clock(factor: float) -> str:
     """What to write where time runs too fast by ``factor`` at least: the shortest unit that explains it."""
-    unit = next((unit for unit, size in _LONGER.items() if size >= factor), "d")
+    unit = next((unit for unit in _LONGER if factor_to(unit, "s") >= factor), _LONGER[-1])
     return f"time may not be in seconds: give its unit in a profile, 'time: {{from: ..., unit: {unit}}}'"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
+from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
 
@@ -34,8 +35,7 @@ _WRONG = "in reverse turns the slips of both sides are wrong."
 def against_warnings(recording: Recording) -> list[str]:
     """A sentence on speeds of wheels, or of the drive train, that are against the ground speed while both are large, mostly."""
     channels, time = recording.channels, recording.time
-    names = [n for n in channels if n.startswith("wheel_speed_") or n == "wheel_based_speed"]
-    known = [n for n in ("ground_speed", *names) if np.isfinite(channels.get(n, np.nan)).any()]
+    known = [n for n in ("ground_speed", *rim_names(channels)) if np.isfinite(channels.get(n, np.nan)).any()]
     if known[:1] != ["ground_speed"]:
         return []
     ground = filled(time, channels["ground_speed"])

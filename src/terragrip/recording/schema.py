@@ -58,6 +58,11 @@ def has_torque(names: Iterable[str]) -> bool:
     return any(name.startswith("drive_torque_") for name in names)
 
 
+def rim_names(names: Iterable[str]) -> list[str]:
+    """The columns of wheels' speeds and of the drive train's."""
+    return [name for name in names if name == "wheel_based_speed" or name.startswith("wheel_speed_")]
+
+
 def has_engine_torque(names: Collection[str]) -> bool:
     """Whether the engine's speed and torque are among the columns."""
     return "engine_speed" in names and not {"engine_torque", "engine_torque_share"}.isdisjoint(names)
