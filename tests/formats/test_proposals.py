@@ -482,3 +482,30 @@ def test_masses_and_hitch_forces_by_their_names(column, channel):
 
     found = candidates_of(columns_of([column], {}, {}, GENERAL)[column])
     assert [one.channel for one in found] == ([] if channel is None else [channel])
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque", "wheels"),
+    [
+        ("Drehzahl {} [1/min]", "Radmoment {} [Nm]", dict(zip(*2 * [("1l", "1r", "2l", "2r", "3l", "3r")], strict=True))),
+        ("axle{}_wheel_rpm", "axle{}_torque_Nm", {"1_left": "1l", "1_right": "1r", "2_left": "2l", "2_right": "2r"}),
+        ("{} speed (rad/s)", "{} torque (Nm)", {"LF wheel": "fl", "RF wheel": "fr", "LM wheel": "ml", "RM wheel": "mr",
+                                                "LR wheel": "rl", "RR wheel": "rr"}),
+        ("wheel_{}_rpm", "wheel_{}_torque_Nm", {"front_left": "fl", "front_right": "fr", "middle_left": "ml",
+                                                "middle_right": "mr", "rear_left": "rl", "rear_right": "rr"}),
+        ("wheel_{}_rpm", "wheel_{}_torque_Nm", {"left_1": "1l", "left_2": "2l", "right_1": "1r", "right_2": "2r"}),
+        ("ESC1 {} rpm", "ESC1 {} torque Nm", {"left": "l", "right": "r"}),  # one controller's number counts no axles
+    ],
+)  # fmt: skip
+def test_the_wheels_of_all_axles_are_proposed(speed: str, torque: str, wheels: dict[str, str]) -> None:
+    """Of six wheels two were proposed, `l` and `r`."""
+    columns = {"ground_speed": SPEED}
+    for k, wheel in enumerate(wheels):
+        columns[speed.format(wheel)] = (
+            SPEED / 0.35 * 60 / (2 * np.pi) * (1 if "rad/s" not in speed else 0.1047)
+        )
+        columns[torque.format(wheel)] = 30 + 2 * np.sin(TIME + k)
+    proposals = _propose(columns)
+    for column, wheel in wheels.items():
+        assert proposals[f"wheel_speed_{wheel}"].entry["from"] == speed.format(column)
+        assert proposals[f"drive_torque_{wheel}"].entry["from"] == torque.format(column)

@@ -88,6 +88,8 @@ def columns_of(
             and (name.has("current") or not name.has("wheel", "motor", "torque"))
         ):
             name = replace(name, wheel="")
+        elif name.wheel[:1].isdigit() and not name.wheel.isdigit() and column not in alike:
+            name = replace(name, wheel=name.wheel[1:])  # the number counts no axles
         stated = units.get(column)
         open_ = stated is not None and (_MISSPELT.fullmatch(stated) or may_be_turns(stated))
         readable = None if open_ else stated  # the sizes tell

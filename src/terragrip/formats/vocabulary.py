@@ -67,11 +67,13 @@ MEANINGS: dict[str, str] = {
     "right": "right r rechts droite derecha derecho destra destro",
     "front": "front vorn vorne vorder avant delantera delantero anteriore voor",
     "rear": "rear back hinten hinter arriere trasera trasero posteriore achter",
+    "middle": "middle mid centre center mitte mittig milieu medio centrale midden",
     "change": "delta d",
 }  # fmt: skip
 _CORNERS = {
     **dict.fromkeys(("fl", "lf", "vl"), "fl"), **dict.fromkeys(("fr", "rf", "vr"), "fr"),
     **dict.fromkeys(("rl", "lr", "bl", "hl"), "rl"), **dict.fromkeys(("rr", "br", "hr"), "rr"),
+    **dict.fromkeys(("ml", "lm"), "ml"), **dict.fromkeys(("mr", "rm"), "mr"),
 }  # fmt: skip
 _FRENCH_CORNERS = {"avg": "fl", "avd": "fr", "arg": "rl", "ard": "rr"}
 _FRENCH = ("roue", "couple", "vitesse", "regime")
@@ -278,7 +280,7 @@ def _is_cut(word: str, bare: bool, full: str, concept: str) -> bool:
     skeleton = _VOWELS.sub("", full)
     if bare and skeleton == word:
         return True
-    if len(full) < 5 or concept in ("left", "right", "front", "rear"):
+    if len(full) < 5 or concept in ("left", "right", "front", "rear", "middle"):
         return False
     return full.startswith(word) or (bare and skeleton.startswith(word))
 
@@ -349,12 +351,12 @@ def _settled(concepts: set[str]) -> frozenset[str]:
 
 
 def _wheel_of(words: list[str], last: list[str], concepts: set[str]) -> str:
-    """The wheel that a name speaks of: a corner, a side with or without its end, or a number; empty if none."""
+    """The wheel that a name speaks of: a corner, a side with its end or its axle's number or neither, or a number; empty if none."""
     corners = _CORNERS | _FRENCH_CORNERS if not set(_FRENCH).isdisjoint(words) else _CORNERS
     for word in words:
         if word in corners:
             return corners[word]
     side = "l" if "left" in concepts else "r" if "right" in concepts else ""
-    end = "f" if "front" in concepts else "r" if "rear" in concepts else ""
+    end = next((end[0] for end in ("front", "rear", "middle") if end in concepts), "")
     number = next((word for word in last if word.isdigit() and 1 <= int(word) <= 8), "")
-    return end + side if side else number
+    return (end or number) + side
