@@ -215,6 +215,8 @@ def test_the_time_vector_of_a_controldesk_signal_is_that_of_its_number_or_the_fi
     assert list(contents.signals) == ([] if clock is None else ["rec.Y[0]"])
     given = [contents.signals[name][0] for name in contents.signals]
     assert [id(one) for one in given] == ([] if clock is None else [id(clocks[clock])])
+    left = [f"rec.Y[0] was left out: its XIndex is {index}, and there are 2 time vectors in X."]
+    assert contents.notes == (left if clock is None else [])
 
 
 def structs(parts: list[dict[str, Any]]) -> np.ndarray:

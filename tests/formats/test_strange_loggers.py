@@ -78,6 +78,14 @@ def test_speeds_of_numbered_drives_are_not_over_ground() -> None:
     assert "ground_speed" not in _propose(columns)
 
 
+def test_kn_of_a_speed_is_knots_and_of_a_force_kilonewtons() -> None:
+    """The speed was left out as a force: 'No ground speed was found'."""
+    knots = 3600 / 1852
+    result = _propose({"gps_speed_kn": knots * SPEED, "drawbar_kn": 2 + SPEED})
+    assert result["ground_speed"].entry == {"from": "gps_speed_kn", "unit": "kn"}
+    assert result["drawbar_force"].entry == {"from": "drawbar_kn", "unit": "kN"}
+
+
 def test_a_receivers_velocities_in_the_plane_go_together() -> None:
     columns = {
         "gps/vel/twist/linear/x": SPEED * np.cos(TIME / 20),

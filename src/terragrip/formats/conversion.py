@@ -22,7 +22,8 @@ from terragrip.formats.derivation import (
 )
 from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, rate_unit
 from terragrip.formats.signals import SAME, union
-from terragrip.formats.table import LogTable, since_clock_was_set
+from terragrip.formats.stamps import Stamps
+from terragrip.formats.table import LogTable
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
 from terragrip.recording.columns import (
@@ -75,11 +76,12 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
 def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
-    log, unset = since_clock_was_set(log, profile.time.column, profile.time.unit)
+    stamps = Stamps(profile.time.column, profile.time.unit)
+    log = stamps.corrected(log)
     wanted = asked(profile, log.columns)
     columns, repeats = merged({n: c for n, c in log.columns.items() if n in wanted}, profile.time.column)
     log = replace(log, columns=columns)
-    notes += [*unset, *repeats.notes()]
+    notes += [*stamps.notes, *repeats.notes()]
     time, start, remarks = _time(profile.time, log)
     notes += remarks
     channels: dict[str, Column] = {}

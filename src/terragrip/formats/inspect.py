@@ -19,6 +19,7 @@ from terragrip.formats.reading import read_log, recording_of
 from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import notes_on, numbers_of
+from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
@@ -226,7 +227,7 @@ class Seen:
         repeats = Repeats()
         if stamp is not None:
             columns, repeats = merged(log.columns, stamp[0])
-            log = replace(log, columns=columns)
+            log = Stamps(stamp.name, stamp.unit).corrected(replace(log, columns=columns))
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
         since_1970 = stamp is not None and (
             stamp[0] in dates

@@ -13,7 +13,8 @@ from terragrip.errors import InputError
 from terragrip.formats.conversion import asked, converted_block, first_start, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.registry import format_of
-from terragrip.formats.table import LogTable, in_si, since_clock_was_set
+from terragrip.formats.stamps import Stamps
+from terragrip.formats.table import LogTable, in_si
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.alignment import aligned
@@ -63,7 +64,7 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
         chosen = [name for name in log.names if is_own(name)]
         own = (
             in_si(block)
-            for block in _since_set(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
+            for block in _with_time_base(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
         )
         return aligned(_checked(own, log.names, chosen, log.source, log.digest, about, log.notes))
     result = settled(profile, table)
@@ -92,7 +93,7 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _Abou
     blocks = _one_row_an_instant(
         log, log.blocks([name for name in log.names if name in wanted], 1), profile.time.column
     )
-    for block in _since_set(log, blocks, table, profile.time.column, profile.time.unit):
+    for block in _with_time_base(log, blocks, table, profile.time.column, profile.time.unit):
         stamps = block.columns[profile.time.column]
         if not len(stamps):
             continue
@@ -103,15 +104,14 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _Abou
         yield converted_block(profile, block, first)
 
 
-def _since_set(
+def _with_time_base(
     log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
 ) -> Iterator[LogTable]:
-    """The blocks as tables, without first rows from before the logger's clock was set."""
-    for number, block in enumerate(blocks):
-        part = replace(table, columns=block)
-        if number == 0:
-            part, notes = since_clock_was_set(part, column, unit)
-            log.notes.extend(notes)
+    """The blocks as tables whose stamps are a time base."""
+    stamps = Stamps(column, unit)
+    for block in blocks:
+        part = stamps.corrected(replace(table, columns=block))
+        log.notes.extend(note for note in stamps.notes if note not in log.notes)
         yield part
 
 

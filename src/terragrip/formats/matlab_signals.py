@@ -139,7 +139,12 @@ def _x_and_y(struct: Mapping[str, Any], name: str, contents: Contents) -> bool:
         at = int(np.ravel(read_array(index))[0]) - 1 if _is_numeric(index) else 0
         block = _PORT.sub("", _own_name(one).replace('"', ""))
         own, values = _joined(name, block or f"Y[{k}]"), one.get("Data")
-        if values is None or not _is_vector(values) or not 0 <= at < len(clocks):
+        if values is None or not _is_vector(values):
+            continue
+        if not 0 <= at < len(clocks):
+            contents.notes.append(
+                f"{own} was left out: its XIndex is {at + 1}, and there are {len(clocks)} time vectors in X."
+            )
             continue
         clock = clocks[at]["Data"]
         length, count = max(clock.shape), max(values.shape)

@@ -15,7 +15,8 @@ from terragrip.formats.conversion import Part
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.table import LogTable, Wanted, in_si, since_clock_was_set
+from terragrip.formats.stamps import Stamps
+from terragrip.formats.table import LogTable, Wanted, in_si
 from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import columns_of, seconds, start_of
@@ -80,8 +81,9 @@ def recording_of(table: LogTable, profile: Profile | None) -> Recording:
 def _as_it_stands(table: LogTable) -> Recording:
     _require(table)
     notes = [*table.notes, *checks.remarks(table.names)]
-    table, unset = since_clock_was_set(table, TIME, _time_unit(table))
-    notes += unset
+    stamps = Stamps(TIME, _time_unit(table))
+    table = stamps.corrected(table)
+    notes += stamps.notes
     return Recording.from_frame(
         in_si(table), table.source, sha256=table.sha256, notes=notes, start=table.start
     )
@@ -177,12 +179,13 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
             place=f"column {TIME}",
             hint="name it in a profile for this source",
         )
-    table, unset = since_clock_was_set(table, TIME, _time_unit(table))
+    stamps = Stamps(TIME, _time_unit(table))
+    table = stamps.corrected(table)
     columns = in_si(table)
-    stamps = columns.pop(TIME)
-    time, _ = seconds(stamps, table.source)
-    start = table.start if table.start is not None else start_of(stamps, time)
-    return Part(time, columns, table.source, table.sha256, (*table.notes, *unset), {}, start)
+    written = columns.pop(TIME)
+    time, _ = seconds(written, table.source)
+    start = table.start if table.start is not None else start_of(written, time)
+    return Part(time, columns, table.source, table.sha256, (*table.notes, *stamps.notes), {}, start)
 
 
 def _time_unit(table: LogTable) -> str:

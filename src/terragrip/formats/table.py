@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
-_FIRST = 1000  # rows in which a logger's clock is set, if it was not
+_TICKS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # a second's
 _SAMPLES = 10_000  # of a signal that are kept or left out together, where a log is looked at in parts
 
 
@@ -86,28 +85,6 @@ def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
     return columns
 
 
-def since_clock_was_set(table: LogTable, column: str, unit: str) -> tuple[LogTable, list[str]]:
-    """The table without first rows that were stamped before the logger's clock was set, and a note on them.
-
-    ``column`` holds the stamps in ``unit``. A jump ahead by years within the first rows tells: 0 s, then seconds since 1970.
-    """
-    stamps = table.columns[column][: _FIRST + 1]
-    if stamps.dtype.kind not in "fiuM" or len(stamps) < 2:
-        return table, []
-    tick = factor_to(unit, "s") if stamps.dtype.kind != "M" else 1.0
-    steps = np.diff(stamps.astype(np.float64) if stamps.dtype.kind != "M" else stamps)
-    seconds = steps / np.timedelta64(1, "s") if stamps.dtype.kind == "M" else steps * tick
-    with np.errstate(invalid="ignore"):
-        jumps = np.flatnonzero(seconds > SINCE_1970)
-    if not len(jumps):
-        return table, []
-    count = int(jumps[-1]) + 1
-    kept = {name: values[count:] for name, values in table.columns.items()}
-    rows = "row was" if count == 1 else "rows were"
-    sentence = f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
-    return replace(table, columns=kept), [sentence]
-
-
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
     """An Arrow column as NumPy; raises InputError on a type that holds neither numbers, texts nor dates.
 
@@ -129,6 +106,11 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         return ticks.view(f"{'datetime64' if pa.types.is_timestamp(kind) else 'timedelta64'}[{kind.unit}]")
     if pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
+    elif pa.types.is_time(kind):  # 10:00:00
+        ticks = column.cast(pa.int32() if kind.bit_width == 32 else pa.int64()).cast(pa.float64())
+        return _numbers(ticks, np.nan) / _TICKS[kind.unit]
+    elif pa.types.is_date(kind):  # a day alone is no instant
+        return _texts(column.cast(pa.string()))
     elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
         raise InputError(
             f"has {kind}, not numbers", file=source, place=f"column {name}", hint="give one number per row"

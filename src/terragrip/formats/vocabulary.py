@@ -242,6 +242,8 @@ class Vocabulary:
         if "speed" in concepts and words and words[-1] in _COMPASS:
             concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
             unit = None if unit == "N" else unit
+        if "speed" in concepts and unit == "kN":
+            unit = "kn"  # speed_kn: knots, no force
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
 

@@ -1,0 +1,80 @@
+"""What a log's stamps need before they are a time base: rows from before its clock was set go, midnights are counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from terragrip.formats.table import LogTable
+from terragrip.recording.columns import DAY, SINCE_1970
+from terragrip.units import factor_to
+
+_FIRST = 1000  # rows in which a logger's clock is set, if it was not
+_PERIODS = (DAY, 7 * DAY)  # s after which a time of day, or of a GPS week, begins anew
+_ABOUT = 60.0  # s: what a log may miss around midnight
+
+
+@dataclass
+class Stamps:
+    """The stamps of a log in ``column``, in ``unit``, as its blocks come, one after the other; ``notes`` on what was done to them."""
+
+    column: str
+    unit: str
+    notes: list[str] = field(default_factory=list)
+    _last: float | None = None  # s
+    _midnights: float = 0.0  # s that they are to be moved by
+
+    def corrected(self, block: LogTable) -> LogTable:
+        """The next block, its stamps a time base."""
+        if self._last is None:
+            block = self._since_clock_was_set(block)
+        return self._past_midnight(block)
+
+    def _since_clock_was_set(self, table: LogTable) -> LogTable:
+        """The table without first rows that were stamped before the logger's clock was set.
+
+        A jump ahead by years within the first rows tells: 0 s, then seconds since 1970.
+        """
+        stamps = table.columns[self.column][: _FIRST + 1]
+        if stamps.dtype.kind not in "fiuM" or len(stamps) < 2:
+            return table
+        tick = factor_to(self.unit, "s") if stamps.dtype.kind != "M" else 1.0
+        steps = np.diff(stamps.astype(np.float64) if stamps.dtype.kind != "M" else stamps)
+        seconds = steps / np.timedelta64(1, "s") if stamps.dtype.kind == "M" else steps * tick
+        with np.errstate(invalid="ignore"):
+            jumps = np.flatnonzero(seconds > SINCE_1970)
+        if not len(jumps):
+            return table
+        count = int(jumps[-1]) + 1
+        rows = "row was" if count == 1 else "rows were"
+        self.notes.append(
+            f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
+        )
+        return replace(table, columns={name: values[count:] for name, values in table.columns.items()})
+
+    def _past_midnight(self, table: LogTable) -> LogTable:
+        """The table, its stamps counted on where the clock began anew."""
+        stamps = table.columns[self.column]
+        if stamps.dtype.kind not in "fiu" or not len(stamps):
+            return table
+        tick = factor_to(self.unit, "s")
+        seconds = stamps.astype(np.float64) * tick
+        known = np.flatnonzero(np.isfinite(seconds))
+        if not len(known):
+            return table
+        first = seconds[known[0]] if self._last is None else self._last
+        back = -np.diff(seconds[known], prepend=first)
+        moved = np.zeros(len(stamps))
+        for period in _PERIODS:
+            moved[known] += period * ((back <= period) & (back > period - _ABOUT))
+        self._last = float(seconds[known[-1]])
+        if moved.any() and not self._midnights:
+            self.notes.append("time begins anew at midnight in the log: what follows counts on from there.")
+        moved = self._midnights + np.cumsum(moved)
+        self._midnights = float(moved[-1])
+        if not self._midnights:
+            return table
+        moved /= tick
+        counted = stamps + (np.round(moved).astype(np.int64) if stamps.dtype.kind in "iu" else moved)
+        return replace(table, columns={**table.columns, self.column: counted})
