@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.plausibility import _pairs
+from terragrip.recording.speed_ratios import _pairs
 from terragrip.recording.turns import filled
 from terragrip.vehicle import Vehicle
 

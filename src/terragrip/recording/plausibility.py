@@ -1,12 +1,17 @@
-"""Units that are likely wrong: sentences for the user, never errors."""
+"""All checks of a log for what is likely wrong in it: sentences for the user, never errors.
+
+`CHECKS` lists them in the order of their sentences, each with those that explain its symptoms: where one of these found something, it
+says nothing itself.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
+from terragrip.arrays import Floats
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
@@ -16,382 +21,197 @@ from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
-from terragrip.recording.mechanics import means_of, motion_warnings, thrusts_of
+from terragrip.recording.mechanics import Means, means_of, motion_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
-from terragrip.recording.ranks import median, quantile
+from terragrip.recording.plain_units import angle_warnings, gravity_warnings, spacing_warnings
+from terragrip.recording.position_speed import position_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
-from terragrip.recording.rolling import RATIOS, slower_warnings
+from terragrip.recording.rolling import slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
+from terragrip.recording.speed_ratios import drive_train_warnings, rim_warnings
 from terragrip.recording.torque_signs import sign_warnings
 from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
-from terragrip.recording.turns import exchange_warnings, filled, straight_rows
+from terragrip.recording.turns import exchange_warnings
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
-# Ratio of wheel speed times radius to ground speed, and its cause; slip raises it by 1/(1 - slip).
-_RATIOS = (
-    (3.6, "wheel_speed may come from km/h, or ground_speed may be 3.6 times too small"),
-    (9.5493, "wheel_speed may be in rpm: 1 rpm is 0.1047 rad/s"),
-    (57.296, "wheel_speed may be in deg/s: 1 deg/s is 0.01745 rad/s"),
-    (1 / 3.6, "ground_speed may be in km/h: 1 km/h is 0.2778 m/s"),
-    (0.51444, "ground_speed may be in knots: 1 kn is 0.5144 m/s"),
-    (0.44704, "ground_speed may be in miles an hour: 1 mph is 0.447 m/s"),
-    (0.10472, "wheel_speed may have been converted from rpm twice, or ground_speed is 9.55 times too fast"),
-    (0.15915, "wheel_speed may be in revolutions per second: 1 rev/s is 6.283 rad/s"),
-    (0.017453, "wheel_speed may have been converted from degrees to radians twice"),
-    (1e-2, "ground_speed may be in cm/s"),
-    (1e-3, "ground_speed may be in mm/s"),
-    (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
-)
-_SLIP = 0.08  # of the rims: how far it may move a ratio from that of its reason
-_FINEST = 0.05  # s: no check has a finer resolution
-_ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
-_APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
-_ONE = 1.15  # quartiles of one ratio
-_GAP = 1.0  # s, or three samples: nothing was measured within it
-_OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
-_TOO_SLOW, _LONG_WAY = 1.03, 20.0  # the same, over windows of so many metres,
-_FEW, _VAGUE = (
-    10,
-    1.117,
-)  # of which at least so many go straight: else it is surely no more than this share less
-_STRAIGHT = 1.01  # both halves of a window over all of it
-_TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
-_WAY_WINDOW = 10.0  # s
-_SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
+_FINEST = 0.05  # s: but for what is lost in means, no check has a finer resolution
 
 
 def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
-    """Sentences on channels that are likely not in SI, or of the wrong sign: speeds against each other and against the positions, the
-    rate of turn against wheels and positions, angles, acceleration, time. Without a vehicle, checks that need its radii are left out.
+    """Sentences on channels that are likely not in SI, of the wrong sign, of another wheel, late, frozen or lost.
 
-    The speeds are compared where both are well above standstill, by the median of their ratio.
+    Without a vehicle that knows its wheels, checks that need their radii are left out.
     """
-    recording, codes = without_codes(recording, vehicle)
-    track, angles, times = track_of(recording), _angle_warnings(recording), _time_warnings(recording)
-    frozen = [*frozen_warnings(recording), *dropout_warnings(recording)]
-    whole, recording = recording, averaged(recording, _FINEST)
-    known = vehicle if vehicle is not None and vehicle.knows_wheels else None
-    made = [] if known is None else odometry_warnings(whole, known)
-    clock = [] if known is None else clock_warnings(whole, known)
-    if clock:  # every other check is by time
-        return [*codes, *clock, *made]
-    against = against_warnings(recording)
-    if against:  # every other check takes it that rims and ground go one way
-        return [*against, *frozen, *codes, *made, *times]
-    shown = None if known is None else shown_turn(recording, track)
-    exchanged = [] if known is None else exchange_warnings(recording, known, shown)
-    sided, uneven = ([], []) if known is None else side_warnings(recording, known, shown)
-    means = means_of(recording)
-    thrusts = {} if known is None or means is None else thrusts_of(recording, known, means)
-    moved = motion_warnings(recording, vehicle, means, thrusts)
-    unsigned = [] if known is None else sign_warnings(recording, known)
-    copied = [] if known is None else copy_warnings(whole, known)
-    speeds = (
-        []
-        if known is None or sided
-        else _speed_warnings(recording, known) or free_axle_warnings(recording, known)
-    )
-    placed = _position_warnings(recording, track, wheels_agree=known is not None and not (sided or speeds))
-    courses = None if speeds or sided or placed else Courses.of(recording, known)
-    moved = moved or acceleration_warnings(courses)
-    lost = (
-        []
-        if known is None
-        else zero_warnings(recording, known, means, thrusts) or leap_warnings(recording, known)
-    )
-    slower = (
-        []
-        if known is None or speeds or sided or moved or frozen
-        else slower_warnings(recording, known, means, shown)
-    )
-    notes = [
-        *speeds,
-        *slower,
-        *sided,
-        *uneven,
-        *_drive_warnings(recording),
-        *drift_warnings(recording),
-        *placed,
-        *exchanged,
-        *turn_rate_warnings(recording, None if exchanged else vehicle, track),
-        *angles,
-        *_acceleration_warnings(recording),
-        *(unsigned or moved),
-        *copied,
-        *(
-            torque_warnings(recording, known, means, thrusts) or balance_warnings(courses, known)
-            if known is not None and not (moved or unsigned or lost)
-            else ()
-        ),
-        *(inertial_warnings(recording, known) if known is not None else ()),
-        *lost,
-        *frozen,
-        *codes,
-        *made,
-        *times,
-    ]
-    if notes or known is None:
-        return notes
-    backward = reverse_warnings(recording, known)
-    if backward:
-        return backward
-    return exchanged_torques(recording, known, shown) or axle_warnings(recording, known, means)
+    log = _Log(recording, vehicle)
+    return [note for check in CHECKS for note in log.found(check.name)]
 
 
 def speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Of `unit_warnings` those of wheel speeds against the ground speed alone: some seconds of driving are enough."""
-    return _speed_warnings(averaged(recording, _FINEST), vehicle) if vehicle.knows_wheels else []
+    return rim_warnings(averaged(recording, _FINEST), vehicle) if vehicle.knows_wheels else []
 
 
-def _speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    result: dict[str, list[tuple[str, float]]] = {}
-    straight = straight_rows(recording, vehicle)
-    usual: dict[str, float] = {}
-    ratios = {
-        wheel: _speed_ratio(recording, wheel, float(radius), straight)
-        for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)
-    }
-    # of wheels of unlike radii one factor is none of the radii
-    known = [ratio for ratio in ratios.values() if ratio]
-    unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
-    shared = unlike and len(known) > 1 and max(known) < np.sqrt(_APART) * min(known)
-    for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
-        ratio = ratios[wheel]
-        if ratio is not None and driven:
-            usual[wheel] = ratio
-        if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
-            continue
-        reasons = list(_RATIOS)
-        if not shared:
-            reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
-            reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
-        # The nearest reason is reported, and with it those that the slip, which is unknown, leaves as likely.
-        near = sorted((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
-        likely = [text for distance, text in near if distance < near[0][0] + _SLIP]
-        why = ", or ".join(likely) if near[0][0] <= np.log(1.35) else "check units, gear ratio and radius"
-        result.setdefault(why, []).append((wheel, ratio))
-    mean = {
-        name: float(np.exp(np.mean([np.log(usual[w]) for w in axle.wheels])))  # of both sides: turns cancel
-        for name, axle in vehicle.axles.items()
-        if all(w in usual for w in axle.wheels)
-    }
-    if not result and mean and max(mean.values()) > _APART * min(mean.values()):
-        fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
-        if not _is_one_ratio(recording, vehicle, fast, slow, straight):
-            return []
-        return [
-            f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
-            "radii, and the wheel of each column."
-        ]
-    return [
-        f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
-        f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
-        for why, those in result.items()
-    ]
+class _Log:
+    """A log and what several checks look at; each is computed when it is first asked for.
 
-
-def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, rows: Bools) -> bool:
-    """Whether the rims of two axles keep one ratio in ``rows`` (n,), as exchanged radii make: where one spins they do not."""
-    rims = []
-    for name in (fast, slow):
-        own = [recording.channels[f"wheel_speed_{w}"] for w in vehicle.axles[name].wheels]
-        rims.append(np.mean([filled(recording.time, np.abs(values)) for values in own], axis=0))
-    moving = rows & (rims[0] > 0.3 * _high(rims[0])) & (rims[1] > 0)
-    low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
-    return high < _ONE * low
-
-
-def _drive_warnings(recording: Recording) -> list[str]:
-    """The drive train's speed against the ground speed: both are in m/s, so a radius cannot cause a factor of 3.6."""
-    ratio = _ratio_of(recording, recording.channels.get("wheel_based_speed"), 1.0)
-    if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
-        return []
-    high, low = "wheel_based_speed", "ground_speed"
-    if ratio < 1:
-        high, low = low, high
-    apart = max(ratio, 1 / ratio)
-    why = (
-        f"{high} may be in km/h, or {low} was converted from km/h and is in m/s"
-        if 2.5 < apart < 5.5
-        else "check units"
-    )
-    return [f"wheel_based_speed is {ratio:.3g} times the ground speed: {why}."]
-
-
-def _position_warnings(recording: Recording, track: Track | None, *, wheels_agree: bool = False) -> list[str]:
-    """Ground speed against the positions, which are in degrees and nothing else.
-
-    Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever the noise. One far below is
-    wrong only if the positions also move further in a straight line than it allows.
+    ``whole`` are its rows without codes for missing values, ``rows`` their means where they are finer than any check needs.
     """
-    if track is None or "ground_speed" not in recording.channels:
-        return []
-    result = _ratio(recording.time, recording.channels["ground_speed"], track.at("speed", recording.time))
-    if result is None:
-        return []
-    sentence = f"ground_speed is {1 / result:.3g} times the speed of the positions"
-    if 2.9 < 1 / result < 4.4:
-        return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
-    if result < 1 / _TOO_FAST:
-        clock = (
-            " The wheel speeds agree with it: time may not be in seconds."
-            if wheels_agree and result < 1 / 3
-            else ""
-        )
-        return [f"{sentence}: check its unit and scale.{clock}"]
-    if 2.9 < result < 4.4 and _straight_ahead(recording, track)[0] > _OUTRUN:
-        return [f"{sentence}: it was converted from km/h, but may be in m/s."]
-    ahead, surely = _straight_ahead(recording, track, _LONG_WAY)
-    if surely > _TOO_SLOW:
-        return [
-            f"In a straight line the positions move {ahead:.3g} times as far as ground_speed does: check its unit and scale "
-            "(a knot is 1.852 km/h, a mile per hour 1.609; a radar's angle), and that latitude and longitude are not exchanged."
-        ]
-    return []
+
+    def __init__(self, recording: Recording, vehicle: Vehicle | None) -> None:
+        self.whole, self.codes = without_codes(recording, vehicle)
+        self.any_vehicle = vehicle
+        self.knows_wheels = vehicle is not None and vehicle.knows_wheels
+        self._found: dict[str, list[str]] = {}
+
+    def found(self, name: str) -> list[str]:
+        """The sentences of a check; none where another one explains them."""
+        if name not in self._found:
+            check = _BY_NAME[name]
+            silent = (check.needs_wheels and not self.knows_wheels) or any(
+                map(self.found, check.explained_by)
+            )
+            self._found[name] = [] if silent else check.find(self)
+        return self._found[name]
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle, of a check that ``needs_wheels``."""
+        assert self.any_vehicle is not None
+        return self.any_vehicle
+
+    @cached_property
+    def rows(self) -> Recording:
+        return averaged(self.whole, _FINEST)
+
+    @cached_property
+    def track(self) -> Track | None:
+        return track_of(self.whole)
+
+    @cached_property
+    def turn(self) -> Floats | None:
+        return shown_turn(self.rows, self.track)
+
+    @cached_property
+    def sides(self) -> tuple[list[str], list[str]]:
+        """Of radii, and of torques."""
+        return side_warnings(self.rows, self.vehicle, self.turn)
+
+    @cached_property
+    def means(self) -> Means | None:
+        return means_of(self.rows)
+
+    @cached_property
+    def thrusts(self) -> dict[str, Floats]:
+        if self.means is None or not self.knows_wheels:
+            return {}
+        return thrusts_of(self.rows, self.vehicle, self.means)
+
+    @cached_property
+    def courses(self) -> Courses | None:
+        return Courses.of(self.rows, self.vehicle if self.knows_wheels else None)
 
 
-def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> tuple[float, float]:
-    """Distance of the positions over the distance by ground speed in the same time: median over windows in motion, of those that go
-    straight where these are many; and that less three standard errors, the scatter's.
+@dataclass(frozen=True)
+class Check:
+    """What ``find`` finds wrong in a log, unless one of the checks ``explained_by`` found something."""
 
-    A turn only shortens a straight line between positions. ``least`` [m]: the shortest distance of a window by ground speed, larger than
-    the positions' noise.
-    """
-    speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
-    way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
-    length = max(_WAY_WINDOW, least / max(_high(speed), 1e-9))
-    edges = np.arange(track.time[0], track.time[-1], length / 2)
-    edges = edges[: len(edges) - (len(edges) + 1) % 2]  # two halves to a window
-    if len(edges) < 3:
-        return 0.0, 0.0
-    north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
-    chord = np.hypot(np.diff(north[::2]), np.diff(east[::2]))
-    halves = np.hypot(np.diff(north), np.diff(east)).reshape(-1, 2).sum(axis=1)
-    edges, made = edges[::2], np.diff(np.interp(edges[::2], recording.time, way))
-    moving = made > 0.3 * _high(made)
-    for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
-        moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
-    straight = moving & (halves < _STRAIGHT * chord)
-    if not moving.any():
-        return 0.0, 0.0
-    rows = straight if straight.sum() >= _FEW else moving
-    ratio = chord[rows] / np.maximum(made[rows], 1e-9)
-    middle = median(ratio)
-    spread = median(
-        np.abs(ratio - middle)
-    )  # 1.4826 of it is the SD, and 1.2533/√n of that the median's error
-    return middle, middle - 5.6 * spread / np.sqrt(len(ratio)) if rows is straight else middle / _VAGUE
+    name: str
+    find: Callable[[_Log], list[str]]
+    explained_by: tuple[str, ...] = ()
+    needs_wheels: bool = True
 
 
-def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:
-    """Median of |wheel speed| radius / |ground speed| in ``rows`` (n,) while both move; None without enough motion."""
-    turning = recording.channels.get(f"wheel_speed_{wheel}")
-    return _ratio_of(recording, None if turning is None else np.where(rows, turning, np.nan), radius)
+_TIME = ("clock",)
+"""Every other check is by time,"""
+_WAY = (*_TIME, "against")
+"""and takes it that rims and ground go one way."""
+_SPEEDS = (*_WAY, "sides", "rims", "free axles")
+_COURSES = (*_SPEEDS, "positions")
+_FORCES = (*_WAY, "signs", "motion", "acceleration", "zeros", "leaps")
 
+_EACH = (
+    Check("clock", lambda log: clock_warnings(log.whole, log.vehicle)),
+    Check("against", lambda log: against_warnings(log.rows), _TIME, needs_wheels=False),
+    Check("rims", lambda log: rim_warnings(log.rows, log.vehicle), (*_WAY, "sides")),
+    Check("free axles", lambda log: free_axle_warnings(log.rows, log.vehicle), (*_WAY, "sides", "rims")),
+    Check(
+        "slower",
+        lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
+        (*_SPEEDS, "signs", "motion", "acceleration", "frozen", "dropouts"),
+    ),
+    Check("sides", lambda log: log.sides[0], _WAY),
+    Check("uneven torques", lambda log: log.sides[1], _WAY),
+    Check("drive train", lambda log: drive_train_warnings(log.rows), _WAY, needs_wheels=False),
+    Check("drift", lambda log: drift_warnings(log.rows), _WAY, needs_wheels=False),
+    Check(
+        "positions",
+        lambda log: position_warnings(
+            log.rows, log.track, wheels_agree=log.knows_wheels and not any(map(log.found, _SPEEDS))
+        ),
+        _WAY,
+        needs_wheels=False,
+    ),
+    Check("exchanged wheels", lambda log: exchange_warnings(log.rows, log.vehicle, log.turn), _WAY),
+    Check(
+        "turn rate",
+        lambda log: turn_rate_warnings(
+            log.rows, None if log.found("exchanged wheels") else log.any_vehicle, log.track
+        ),
+        _WAY,
+        needs_wheels=False,
+    ),
+    Check("angles", lambda log: angle_warnings(log.whole), _WAY, needs_wheels=False),
+    Check("gravity", lambda log: gravity_warnings(log.rows), _WAY, needs_wheels=False),
+    Check("signs", lambda log: sign_warnings(log.rows, log.vehicle), _WAY),
+    Check(
+        "motion",
+        lambda log: motion_warnings(log.rows, log.any_vehicle, log.means, log.thrusts),
+        (*_WAY, "signs"),
+        needs_wheels=False,
+    ),
+    Check(
+        "acceleration",
+        lambda log: acceleration_warnings(log.courses),
+        (*_COURSES, "signs", "motion"),
+        needs_wheels=False,
+    ),
+    Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
+    Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means, log.thrusts), _FORCES),
+    Check(
+        "balance",
+        lambda log: balance_warnings(log.courses, log.vehicle),
+        (*_COURSES, *_FORCES, "torques"),
+    ),
+    Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
+    Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means, log.thrusts), _WAY),
+    Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
+    Check("frozen", lambda log: frozen_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("dropouts", lambda log: dropout_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("codes", lambda log: log.codes, needs_wheels=False),
+    Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
+    Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),
+)
+_ALL = tuple(check.name for check in _EACH)
+_ELSE = (
+    Check("reverse", lambda log: reverse_warnings(log.rows, log.vehicle), _ALL),
+    Check(
+        "exchanged torques",
+        lambda log: exchanged_torques(log.rows, log.vehicle, log.turn),
+        (*_ALL, "reverse"),
+    ),
+    Check(
+        "axles",
+        lambda log: axle_warnings(log.rows, log.vehicle, log.means),
+        (*_ALL, "reverse", "exchanged torques"),
+    ),
+)
+"""Their symptoms are those of other mistakes, too."""
 
-def _ratio_of(recording: Recording, turning: Floats | None, radius: float) -> float | None:
-    speed = recording.channels.get("ground_speed")
-    if speed is None or turning is None:
-        return None
-    return _ratio(recording.time, speed, radius * turning)
-
-
-def _ratio(time: Floats, speed: Floats, other: Floats) -> float | None:
-    """Median of |other| / |speed| (n,) while both move; None without enough motion."""
-    pairs = _pairs(time, speed, other)
-    if pairs is None:
-        return None
-    ground, rim = np.abs(pairs[0]), np.abs(pairs[1])
-    moving = (ground > 0.3 * _high(ground)) & (rim > 0.3 * _high(rim)) & (ground > 0) & (rim > 0)
-    return median(rim[moving] / ground[moving]) if moving.sum() >= 10 else None
-
-
-def _high(values: Floats) -> float:
-    """The value that 5 % of the values (n,), n > 0, exceed."""
-    rank = int(0.95 * (len(values) - 1))
-    return float(np.partition(values, rank)[rank])
-
-
-def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
-    """About `_ENOUGH` pairs of ground speed and wheel speed at one time; None where either has fewer than two values."""
-    few = slice(None, None, max(1, len(time) // _ENOUGH))
-    if np.isfinite(speed[few]).all() and np.isfinite(turning[few]).all() and len(time) > 1:
-        return speed[few], turning[few]
-    known, rows = np.flatnonzero(np.isfinite(speed)), np.flatnonzero(np.isfinite(turning))
-    if len(known) < 2 or len(rows) < 2:
-        return None
-    after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
-    rows = rows[time[known[after]] - time[known[after - 1]] < max(_GAP, 3 * median(np.diff(time[known])))]
-    if not len(rows):
-        return None
-    rows = rows[:: max(1, len(rows) // _ENOUGH)]
-    return np.interp(time[rows], time[known], speed[known]), turning[rows]
-
-
-def _angle_warnings(recording: Recording) -> list[str]:
-    notes = []
-    for name in ("pitch", "roll"):
-        size = _typical_size(recording, name)
-        if size is not None and size > 1.6:
-            notes.append(f"{name} reaches {size:.3g} rad: it may be in degrees.")
-    for name in ("latitude", "longitude"):
-        values = recording.channels.get(name)
-        if values is not None and np.nanmax(np.abs(values), initial=0.0) > 180:
-            notes.append(f"{name} exceeds 180: it must be in degrees.")
-    return notes
-
-
-def _acceleration_warnings(recording: Recording) -> list[str]:
-    values = recording.channels.get("acceleration_z")
-    if values is None or not np.isfinite(values).any():
-        return []
-    rest = float(np.nanmedian(values))
-    if 0.9 < abs(rest) < 1.1:
-        return ["acceleration_z rests at 1: the accelerations may be in g."]
-    if rest < -8:
-        return ["acceleration_z rests at -g: the axes point the other way (z up, specific force)."]
-    return []
-
-
-def _time_warnings(recording: Recording) -> list[str]:
-    if len(recording) < 10:
-        return []
-    step = np.diff(recording.time)
-    spacing = median(step[:: max(1, len(step) // _ENOUGH)])
-    if _is_written_as_hhmmss(recording.time, spacing):
-        return [
-            "time is a time of day written as hhmmss: 59 is followed by 100. Write it as 10:00:00.5, or as seconds; "
-            "every time, distance and gap is wrong now."
-        ]
-    mean = float(recording.time[-1] - recording.time[0]) / len(
-        step
-    )  # instants of two clocks may be close by chance
-    if spacing < _SPARSE and mean > _DENSE:
-        return []
-    return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]
-
-
-def _is_written_as_hhmmss(time: Floats, spacing: float) -> bool:
-    """Whether the last two digits before the point never reach 60, but go on from 59 to the next hundred."""
-    if not (time[0] >= 0 and time[-1] < 240000):
-        return False
-    digits, hundreds = time % 100, time // 100
-    change = np.flatnonzero(np.diff(hundreds))
-    near = max(3 * spacing, 1.0)
-    goes_on = (digits[change] >= 60 - near) & (digits[change + 1] < near)
-    return len(change) > 0 and bool((digits < 60).all() and (hundreds % 100 < 60).all() and goes_on.all())
-
-
-def _typical_size(recording: Recording, name: str) -> float | None:
-    values = recording.channels.get(name)
-    known = None if values is None else np.abs(values[np.isfinite(values)])
-    return None if known is None or not len(known) else quantile(known, 0.95)
+CHECKS = _EACH + _ELSE
+_BY_NAME = {check.name: check for check in CHECKS}

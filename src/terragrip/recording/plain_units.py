@@ -1,0 +1,81 @@
+"""Angles, gravity and time that are likely not in SI, each by itself: sentences for the user, never errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.ranks import median, quantile
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+
+Floats = npt.NDArray[np.float64]
+
+_ENOUGH = 4000  # rows that show how far rows are apart
+_SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
+
+
+def angle_warnings(recording: Recording) -> list[str]:
+    """Angles of the body that are in degrees, positions that are not."""
+    notes = []
+    for name in ("pitch", "roll"):
+        size = _typical_size(recording, name)
+        if size is not None and size > 1.6:
+            notes.append(f"{name} reaches {size:.3g} rad: it may be in degrees.")
+    for name in ("latitude", "longitude"):
+        values = recording.channels.get(name)
+        if values is not None and np.nanmax(np.abs(values), initial=0.0) > 180:
+            notes.append(f"{name} exceeds 180: it must be in degrees.")
+    return notes
+
+
+def gravity_warnings(recording: Recording) -> list[str]:
+    """A vertical acceleration that rests at another value than gravity."""
+    values = recording.channels.get("acceleration_z")
+    if values is None or not np.isfinite(values).any():
+        return []
+    rest = float(np.nanmedian(values))
+    if 0.9 < abs(rest) < 1.1:
+        return ["acceleration_z rests at 1: the accelerations may be in g."]
+    if rest < -8:
+        return ["acceleration_z rests at -g: the axes point the other way (z up, specific force)."]
+    return []
+
+
+def spacing_warnings(recording: Recording) -> list[str]:
+    """Rows that are further apart, or closer, than those of a drive, and a time written as hhmmss."""
+    if len(recording) < 10:
+        return []
+    step = np.diff(recording.time)
+    spacing = median(step[:: max(1, len(step) // _ENOUGH)])
+    if _is_written_as_hhmmss(recording.time, spacing):
+        return [
+            "time is a time of day written as hhmmss: 59 is followed by 100. Write it as 10:00:00.5, or as seconds; "
+            "every time, distance and gap is wrong now."
+        ]
+    mean = float(recording.time[-1] - recording.time[0]) / len(
+        step
+    )  # instants of two clocks may be close by chance
+    if spacing < _SPARSE and mean > _DENSE:
+        return []
+    return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]
+
+
+def _is_written_as_hhmmss(time: Floats, spacing: float) -> bool:
+    """Whether the last two digits before the point never reach 60, but go on from 59 to the next hundred."""
+    if not (time[0] >= 0 and time[-1] < 240000):
+        return False
+    digits, hundreds = time % 100, time // 100
+    change = np.flatnonzero(np.diff(hundreds))
+    near = max(3 * spacing, 1.0)
+    goes_on = (digits[change] >= 60 - near) & (digits[change + 1] < near)
+    return len(change) > 0 and bool((digits < 60).all() and (hundreds % 100 < 60).all() and goes_on.all())
+
+
+def _typical_size(recording: Recording, name: str) -> float | None:
+    values = recording.channels.get(name)
+    known = None if values is None else np.abs(values[np.isfinite(values)])
+    return None if known is None or not len(known) else quantile(known, 0.95)

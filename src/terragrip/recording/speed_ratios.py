@@ -1,0 +1,164 @@
+"""Wheel speeds and a drive train's speed against the ground speed: sentences for the user, never errors.
+
+They are compared where both are well above standstill, by the median of their ratio.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.recording.ranks import median, quantile
+from terragrip.recording.rolling import RATIOS
+from terragrip.recording.turns import filled, straight_rows
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+# Ratio of wheel speed times radius to ground speed, and its cause; slip raises it by 1/(1 - slip).
+_RATIOS = (
+    (3.6, "wheel_speed may come from km/h, or ground_speed may be 3.6 times too small"),
+    (9.5493, "wheel_speed may be in rpm: 1 rpm is 0.1047 rad/s"),
+    (57.296, "wheel_speed may be in deg/s: 1 deg/s is 0.01745 rad/s"),
+    (1 / 3.6, "ground_speed may be in km/h: 1 km/h is 0.2778 m/s"),
+    (0.51444, "ground_speed may be in knots: 1 kn is 0.5144 m/s"),
+    (0.44704, "ground_speed may be in miles an hour: 1 mph is 0.447 m/s"),
+    (0.10472, "wheel_speed may have been converted from rpm twice, or ground_speed is 9.55 times too fast"),
+    (0.15915, "wheel_speed may be in revolutions per second: 1 rev/s is 6.283 rad/s"),
+    (0.017453, "wheel_speed may have been converted from degrees to radians twice"),
+    (1e-2, "ground_speed may be in cm/s"),
+    (1e-3, "ground_speed may be in mm/s"),
+    (1e3, "wheel_speed or ground_speed may be off by a factor of 1000"),
+)
+_SLIP = 0.08  # of the rims: how far it may move a ratio from that of its reason
+_ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
+_APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
+_ONE = 1.15  # quartiles of one ratio
+_GAP = 1.0  # s, or three samples: nothing was measured within it
+
+
+def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """Wheel speeds that are likely not in rad/s, or radii that are wrong, by the ground speed."""
+    result: dict[str, list[tuple[str, float]]] = {}
+    straight = straight_rows(recording, vehicle)
+    usual: dict[str, float] = {}
+    ratios = {
+        wheel: _speed_ratio(recording, wheel, float(radius), straight)
+        for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)
+    }
+    # of wheels of unlike radii one factor is none of the radii
+    known = [ratio for ratio in ratios.values() if ratio]
+    unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
+    shared = unlike and len(known) > 1 and max(known) < np.sqrt(_APART) * min(known)
+    for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
+        ratio = ratios[wheel]
+        if ratio is not None and driven:
+            usual[wheel] = ratio
+        if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
+            continue
+        reasons = list(_RATIOS)
+        if not shared:
+            reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
+            reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
+        # The nearest reason is reported, and with it those that the slip, which is unknown, leaves as likely.
+        near = sorted((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
+        likely = [text for distance, text in near if distance < near[0][0] + _SLIP]
+        why = ", or ".join(likely) if near[0][0] <= np.log(1.35) else "check units, gear ratio and radius"
+        result.setdefault(why, []).append((wheel, ratio))
+    mean = {
+        name: float(np.exp(np.mean([np.log(usual[w]) for w in axle.wheels])))  # of both sides: turns cancel
+        for name, axle in vehicle.axles.items()
+        if all(w in usual for w in axle.wheels)
+    }
+    if not result and mean and max(mean.values()) > _APART * min(mean.values()):
+        fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
+        if not _is_one_ratio(recording, vehicle, fast, slow, straight):
+            return []
+        return [
+            f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
+            "radii, and the wheel of each column."
+        ]
+    return [
+        f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
+        f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
+        for why, those in result.items()
+    ]
+
+
+def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, rows: Bools) -> bool:
+    """Whether the rims of two axles keep one ratio in ``rows`` (n,), as exchanged radii make: where one spins they do not."""
+    rims = []
+    for name in (fast, slow):
+        own = [recording.channels[f"wheel_speed_{w}"] for w in vehicle.axles[name].wheels]
+        rims.append(np.mean([filled(recording.time, np.abs(values)) for values in own], axis=0))
+    moving = rows & (rims[0] > 0.3 * top_speed(rims[0])) & (rims[1] > 0)
+    low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
+    return high < _ONE * low
+
+
+def drive_train_warnings(recording: Recording) -> list[str]:
+    """The drive train's speed against the ground speed: both are in m/s, so a radius cannot cause a factor of 3.6."""
+    ratio = _to_ground(recording, recording.channels.get("wheel_based_speed"), 1.0)
+    if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
+        return []
+    high, low = "wheel_based_speed", "ground_speed"
+    if ratio < 1:
+        high, low = low, high
+    apart = max(ratio, 1 / ratio)
+    why = (
+        f"{high} may be in km/h, or {low} was converted from km/h and is in m/s"
+        if 2.5 < apart < 5.5
+        else "check units"
+    )
+    return [f"wheel_based_speed is {ratio:.3g} times the ground speed: {why}."]
+
+
+def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:
+    """Median of |wheel speed| radius / |ground speed| in ``rows`` (n,) while both move; None without enough motion."""
+    turning = recording.channels.get(f"wheel_speed_{wheel}")
+    return _to_ground(recording, None if turning is None else np.where(rows, turning, np.nan), radius)
+
+
+def _to_ground(recording: Recording, turning: Floats | None, radius: float) -> float | None:
+    speed = recording.channels.get("ground_speed")
+    if speed is None or turning is None:
+        return None
+    return ratio_of(recording.time, speed, radius * turning)
+
+
+def ratio_of(time: Floats, speed: Floats, other: Floats) -> float | None:
+    """Median of |other| / |speed| (n,) while both move; None without enough motion."""
+    pairs = _pairs(time, speed, other)
+    if pairs is None:
+        return None
+    ground, rim = np.abs(pairs[0]), np.abs(pairs[1])
+    moving = (ground > 0.3 * top_speed(ground)) & (rim > 0.3 * top_speed(rim)) & (ground > 0) & (rim > 0)
+    return median(rim[moving] / ground[moving]) if moving.sum() >= 10 else None
+
+
+def top_speed(values: Floats) -> float:
+    """The value that 5 % of the values (n,), n > 0, exceed."""
+    rank = int(0.95 * (len(values) - 1))
+    return float(np.partition(values, rank)[rank])
+
+
+def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
+    """About `_ENOUGH` pairs of ground speed and wheel speed at one time; None where either has fewer than two values."""
+    few = slice(None, None, max(1, len(time) // _ENOUGH))
+    if np.isfinite(speed[few]).all() and np.isfinite(turning[few]).all() and len(time) > 1:
+        return speed[few], turning[few]
+    known, rows = np.flatnonzero(np.isfinite(speed)), np.flatnonzero(np.isfinite(turning))
+    if len(known) < 2 or len(rows) < 2:
+        return None
+    after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
+    rows = rows[time[known[after]] - time[known[after - 1]] < max(_GAP, 3 * median(np.diff(time[known])))]
+    if not len(rows):
+        return None
+    rows = rows[:: max(1, len(rows) // _ENOUGH)]
+    return np.interp(time[rows], time[known], speed[known]), turning[rows]
