@@ -12,6 +12,7 @@ from tests.estimation.turning_log import TRACK, machine, turning_log
 
 import terragrip as tg
 from terragrip.arrays import Bools, Floats
+from terragrip.estimation.batch import estimated
 from terragrip.estimation.turning import _unseen_turns, turn_in
 from terragrip.recording import LogBlocks, Recording
 
@@ -45,7 +46,7 @@ def test_blocks_tell_the_turn_of_the_whole_log() -> None:
     parts, _ = turn_in(LogBlocks.of(log, 250), log, machine())
     assert whole is not None
     assert parts is not None
-    np.testing.assert_array_equal(whole.turn, parts.turn)
+    np.testing.assert_array_equal(whole.track.turn, parts.track.turn)
 
 
 def test_a_gyroscope_is_not_replaced() -> None:
@@ -61,6 +62,27 @@ def test_a_gyroscope_that_falls_silent_is_said(measured: Callable[[Floats], Bool
     turn = np.where(measured(log.time), np.convolve(turn, np.ones(10) / 10, "same"), np.nan)
     estimates = tg.estimate(without(log, *POSITIONS).with_channels(angular_velocity_z=turn), machine())
     assert any("Log the yaw rate throughout" in note for note in estimates.notes) is said
+
+
+def test_a_gyroscope_that_falls_silent_is_replaced_by_the_positions_there() -> None:
+    """Slips of inner and outer wheel were as far apart as their hubs in every turn behind it, though positions showed the turn."""
+    log = turning_log(3, seconds=160.0, free=0.0)
+    turn = np.where(log.time % 40 > 30, np.pi / 10, 0.0) * np.where(log.time % 80 > 40, 1, -1)
+    yaw = np.convolve(turn, np.ones(10) / 10, "same")
+    full = log.with_channels(angular_velocity_z=yaw)
+    part = log.with_channels(angular_velocity_z=np.where(log.time < 60, yaw, np.nan))
+    blind = tg.estimate(without(part, *POSITIONS), machine())
+    truth, shown = tg.estimate(full, machine()), tg.estimate(part, machine())
+    assert any("is that of the positions there" in note for note in shown.notes)
+    assert not any("positions" in note for note in truth.notes)
+    late = (log.time > 62) & (np.abs(yaw) > 0.3)
+    hubs = TRACK * np.pi / 10 / 1.2
+    off = [np.median(np.abs(one["slip_r"] - truth["slip_r"])[late]) for one in (shown, blind)]
+    assert off[0] < 0.1 * hubs < off[1]
+    early = log.time < 55
+    np.testing.assert_allclose(shown["slip_r"][early], truth["slip_r"][early], atol=1e-3)
+    parts = list(estimated(LogBlocks.of(part, 250), machine()))
+    np.testing.assert_array_equal(np.concatenate([one["slip_r"] for one in parts]), shown["slip_r"])
 
 
 @pytest.mark.parametrize(

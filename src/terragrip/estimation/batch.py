@@ -124,7 +124,7 @@ def estimated(
         known.sample.check_against(vehicle)
     # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
-    track, turn_notes = turn_in(log, known.sample, vehicle)
+    turn, turn_notes = turn_in(log, known.sample, vehicle)
     sensors = dict(options.sensors or {})
     # By consecutive rows, which a sample of them does not hold.
     if vehicle.sensors.ground_speed_delay is None:
@@ -140,7 +140,7 @@ def estimated(
         slip_reference=reference,
         together=together,
     )
-    estimator.track = track
+    estimator.turn = turn
     if planned is not None:
         beside_them = (*carried_channels(known.sample, estimator), *known.sample.labels)
         planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))

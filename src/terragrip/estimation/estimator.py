@@ -24,8 +24,8 @@ from terragrip.vehicle import Vehicle
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.slip_only import SlipReference
+    from terragrip.estimation.turning import ShownTurn
     from terragrip.recording import Recording
-    from terragrip.recording.track import Track
 
 _SNAPSHOT_MAGIC = b"TGRIPSN2"
 
@@ -116,7 +116,7 @@ class TractionEstimator:
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed, together=together)
         self.slip_reference: SlipReference | None = None
-        self.track: Track | None = None
+        self.turn: ShownTurn | None = None
         self.rims: tuple[Rim, ...] = ()
         self._accepted: set[str] = set()
         if speeds_alone(self.channels, vehicle):

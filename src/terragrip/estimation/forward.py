@@ -46,8 +46,8 @@ def run(
 def prepared(estimator: TractionEstimator, recording: Recording) -> tuple[Floats, dict[str, Floats]]:
     """Time and those channels that the estimator uses, each contiguous."""
     wanted, channels = estimator.engine.slots_in, recording.channels
-    if estimator.track is not None:
-        channels = {**channels, "angular_velocity_z": estimator.track.at("turn", recording.time)}
+    if estimator.turn is not None:
+        channels = {**channels, "angular_velocity_z": estimator.turn.over(recording)}
     columns = {name: np.ascontiguousarray(values) for name, values in channels.items() if name in wanted}
     return np.ascontiguousarray(recording.time), columns
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
 
 _YAW_RATE = "angular_velocity_z"
+_KEPT = 1.0  # s that the estimator goes on with a rate of turn
 _CALM = 4.0  # s over which a yaw rate is taken from positions
 _MOVING = 0.1  # m/s
 _WINDOW = 2.0  # s
@@ -22,8 +23,25 @@ _TURNING = 0.04  # relative difference of the rims from side to side
 _MUCH = 0.1  # share of the driving
 
 
-def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track | None, list[str]]:
-    """The motion by the positions, where no sensor measures how fast the machine turns, and a sentence on it.
+@dataclass(frozen=True)
+class ShownTurn:
+    """The rate of turn by the positions (``track``): throughout, or in the ``silences`` (k, 2) [s] of a gyroscope."""
+
+    track: Track
+    silences: Floats | None = None
+
+    def over(self, recording: Recording) -> Floats:
+        """The rate of turn (n,) [rad/s] to be used in a recording's rows, NaN where nothing shows it."""
+        placed = self.track.at("turn", recording.time)
+        if self.silences is None:
+            return placed
+        place = np.searchsorted(self.silences[:, 0], recording.time, side="right") - 1
+        silent = (place >= 0) & (recording.time < self.silences[place, 1])
+        return np.where(silent, placed, recording.channels[_YAW_RATE])
+
+
+def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownTurn | None, list[str]]:
+    """The rate of turn by the positions, where no sensor measures how fast the machine turns, and a sentence on it.
 
     ``sample``: rows of the log, by which it is judged whether the machine turned where nothing tells how fast.
     """
@@ -31,24 +49,44 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Track 
     rims = rims_of(vehicle, channels)
     if not any(rim.side or rim.ahead for rim in rims):
         return None, []
-    if _YAW_RATE in channels:
-        return None, _unseen_turns(sample, rims)
-    track = track_of(_positions(log), _CALM) if {"latitude", "longitude"} <= set(channels) else None
-    if track is not None and np.isfinite(track.turn).any():
-        return track, ["The rate of turn is that of the positions."]
-    return None, _unseen_turns(sample, rims)
+    unseen = _unseen_turns(sample, rims)
+    if not {"latitude", "longitude"} <= set(channels) or (_YAW_RATE in channels and not unseen):
+        return None, unseen
+    whole = _turns(log)
+    track = track_of(whole, _CALM)
+    if track is None or not np.isfinite(track.turn).any():
+        return None, unseen
+    if _YAW_RATE not in channels:
+        return ShownTurn(track), ["The rate of turn is that of the positions."]
+    return ShownTurn(track, _silences(whole)), [
+        f"{_YAW_RATE} falls silent where the machine turns: the rate of turn is that of the positions there."
+    ]
 
 
-def _positions(log: LogBlocks) -> Recording:
-    """The positions of a whole log."""
-    names = ("latitude", "longitude")
-    parts = [(block.time, *(block.channels[name] for name in names)) for block in log.blocks()]
-    time, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Recording(time, dict(zip(names, columns, strict=True)))
+def _turns(log: LogBlocks) -> Recording:
+    """What shows the turns of a whole log."""
+    names = ("latitude", "longitude", _YAW_RATE)
+    parts = [
+        (block.time, {n: block.channels[n] for n in names if n in block.channels}) for block in log.blocks()
+    ]
+    known = {name for _, channels in parts for name in channels}
+    joined = {
+        name: np.concatenate([own.get(name, np.full(len(time), np.nan)) for time, own in parts])
+        for name in known
+    }
+    return Recording(np.concatenate([time for time, _ in parts]), joined)
+
+
+def _silences(log: Recording) -> Floats:
+    """Begin and end (k, 2) [s] of where a gyroscope has no value for longer than the estimator keeps one."""
+    known = log.time[np.isfinite(log.channels[_YAW_RATE])]
+    edges = np.r_[-np.inf, known, np.inf]
+    long = np.diff(edges) > _KEPT
+    return np.column_stack([edges[:-1][long], edges[1:][long]])
 
 
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
-    """A sentence on a rate of turn that is missing, or silent: after a second without it the estimator takes the drive for straight."""
+    """A sentence on a rate of turn that is missing, or silent: the estimator then takes the drive for straight."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
     names = [*(rim.channel for rim in rims), *([_YAW_RATE] if _YAW_RATE in log.channels else [])]
