@@ -153,6 +153,26 @@ def test_a_robots_pull_is_told_in_newtons():
     assert newtons == pytest.approx(one.best_efficiency.net_traction * 60 * 9.80665, abs=1)
 
 
+def test_a_light_front_axle_is_told_by_hand_and_of_two_axles_only():
+    """A front axle of 22 % loses D h / (g L) to the pull D; of four axles each carries about a quarter, and was told the same."""
+    tree = VEHICLE.to_dict()
+    tree["axles"]["front"]["mass"], tree["axles"]["rear"]["mass"] = 1320.0, 4680.0
+    light = Vehicle.from_dict(tree)
+    one = only([drive(vehicle=light)], light)
+    pull = one.best_efficiency.net_traction * 6000
+    (action,) = (a for a in one.actions if "front axle" in a.what)
+    assert f"carries {(1320 - pull * 0.5 / 2.5) / 6000:.0%} of the weight" in action.why
+    wheels = {"radius": 0.7, "inertia": 50.0}
+    tree = {
+        **tree,
+        "axles": {
+            f"axle{k}": {"mass": 1500.0, "wheels": [f"{k}l", f"{k}r"], "wheel": wheels} for k in (1, 2, 3, 4)
+        },
+    }
+    long = Vehicle.from_dict(tree | {"hitch_height": 1.5})
+    assert not any("front axle" in a.what for a in only([drive(vehicle=long)], long).actions)
+
+
 def test_the_reserve_is_what_the_mean_adhesion_leaves_of_the_curves_top():
     one = only([drive(a=0.9)])
     used = one.drive["adhesion"]

@@ -161,8 +161,8 @@ def _speed(work: Work, vehicle: Vehicle) -> list[Action]:
 
 
 def _split(work: Work, vehicle: Vehicle) -> list[Action]:
-    """The axles' loads at the advised pull, by the quasi-static formula (physics.md 3)."""
-    if len(vehicle.axles) < 2:
+    """The loads of two axles at the advised pull, by the quasi-static formula (physics.md 3)."""
+    if len(vehicle.axles) != 2:
         return []
     load = axle_loads(
         vehicle.axle_mass,
