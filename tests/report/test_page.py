@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from terragrip.errors import InputError
-from terragrip.report import sections
+from terragrip.report import sections, wheels
 from terragrip.report.intervals import pooled, run_coverage
 from terragrip.report.page import Headline, Page, Picture, Section, Table, number, percent, render, write_page
 from terragrip.report.runs import Run
@@ -208,3 +208,24 @@ def test_a_sentence_in_a_tables_first_column_is_wrapped() -> None:
     page = Page("x", "y", (Section("a", "A", (), (Table("t", ("missing", "for"), (row,)),)),))
     assert '<th scope="row" class="prose">slip is known' in render(page)
     assert re.search(r"th\.prose[^}]*white-space: normal", render(page))
+
+
+def test_what_has_nothing_to_show_stands_together_at_the_end_with_its_reason() -> None:
+    """Eleven empty sections stood between the figures of a log without labels, sensor and positions."""
+    sections_ = (
+        Section("path", "Where", omitted="Left out: no position."),
+        Section("summary", "Summary", ("Driven.",)),
+    )
+    html = render(Page("Report", "", sections_))
+    assert html.index("Driven.") < html.index("What is left out</h2>") < html.index("Left out: no position.")
+    nav = html[html.index("<nav") : html.index("</nav>")]
+    assert "#summary" in nav
+    assert "#left-out" in nav
+    assert "#path" not in nav
+    assert 'id="path"' in html
+    assert "What is left out" not in render(Page("Report", "", sections_[1:]))
+
+
+def test_the_wheels_of_a_machine_on_six_axles_can_be_told_apart() -> None:
+    """The seventh wheel had the first one's colour and dash."""
+    assert len({wheels.look(k) for k in range(12)}) == 12

@@ -72,6 +72,16 @@ class Page:
     simulated: bool = False
     facts: tuple[tuple[str, str], ...] = field(default=())
 
+    @property
+    def shown(self) -> tuple[Section, ...]:
+        """The sections that have something to show."""
+        return tuple(one for one in self.sections if not one.omitted)
+
+    @property
+    def left_out(self) -> tuple[Section, ...]:
+        """The sections that have nothing to show: together behind the others, each with the reason."""
+        return tuple(one for one in self.sections if one.omitted)
+
 
 def render(page: Page) -> str:
     """The page as one HTML document, styles and figures inside.

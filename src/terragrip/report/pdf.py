@@ -62,7 +62,8 @@ def _plain(page: Page, root: Path) -> dict[str, Any]:
         "headlines": [
             {"value": one.value, "label": one.label, "beside": one.beside} for one in page.headlines
         ],
-        "sections": [_section(one, root) for one in page.sections],
+        "sections": [_section(one, root) for one in page.shown],
+        "left_out": [{"title": one.title, "why": one.omitted} for one in page.left_out],
         "facts": [list(fact) for fact in page.facts],
     }
 
@@ -71,7 +72,6 @@ def _section(section: Section, root: Path) -> dict[str, Any]:
     content = [_figure(one, root) if isinstance(one, Picture) else _table(one) for one in section.content]
     return {
         "title": section.title,
-        "omitted": section.omitted,
         "prose": list(section.prose),
         "content": content,
     }

@@ -10,12 +10,18 @@ from terragrip.report.page import Picture, Section, Table, number, percent
 from terragrip.report.runs import Run
 from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled, to_svg
 
-_LOOKS = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"), (VERMILLION, "-"), (SKY, "--"))
-"""Colour and dash: either tells the wheels apart."""
+_COLORS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, SKY)
+_DASHES = ("-", "--", "-.", ":")
+
 SLOTS = 240
 """Means over time that a line is drawn with."""
 _UNSURE = 0.15
 QUANTITIES = (("slip", "slip s [–]"), ("adhesion", "adhesion µ [–]"))
+
+
+def look(k: int) -> tuple[str, str]:
+    """Colour and dash of wheel ``k``: of twelve wheels no two have both in common."""
+    return _COLORS[k % len(_COLORS)], _DASHES[k % len(_DASHES)]
 
 
 def section(run: Run) -> Section | None:
@@ -40,7 +46,7 @@ def draw(run: Run, shown: list[tuple[str, str]]) -> str:
         plots = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
         for plot, (name, label) in zip(plots, shown, strict=True):
             for i, wheel in enumerate(run.wheels):
-                color, dash = _LOOKS[i % len(_LOOKS)]
+                color, dash = look(i)
                 plot.plot(
                     *_means(run.time, _known(run, name, wheel)),
                     color=color,
