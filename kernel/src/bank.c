@@ -16,7 +16,7 @@ TG_INLINE void bank_factor(array *a, int rows, int columns, int joining, const t
     tg_lanes v[COLUMNS_MAX];
     for (int j = rows - 1; j >= 0; j--) {
         const tg_lanes *const own = a->W[j];
-        tg_lanes even = noise ? noise[j] : bank_zeros(), odd = lanes_all(TG_TINY);
+        tg_lanes even = noise ? noise[j] : lanes_all(0), odd = lanes_all(TG_TINY);
         for (int k = 0; k < columns; k++) v[k] = lanes_mul(a->weight[k], own[k]);
         for (int k = 0; k + 2 <= columns; k += 2) {
             even = lanes_mul_add(v[k], own[k], even);
@@ -28,7 +28,7 @@ TG_INLINE void bank_factor(array *a, int rows, int columns, int joining, const t
         u[j][j] = lanes_all(1);
         for (int i = 0; i < j; i++) {
             tg_lanes *const row = a->W[i];
-            tg_lanes sum[4] = {bank_zeros(), bank_zeros(), bank_zeros(), bank_zeros()};
+            tg_lanes sum[4] = {lanes_all(0), lanes_all(0), lanes_all(0), lanes_all(0)};
             int k = 0;
             for (; k + 4 <= columns; k += 4)
                 for (int c = 0; c < 4; c++) sum[c] = lanes_mul_add(v[k + c], row[k + c], sum[c]);
@@ -36,7 +36,7 @@ TG_INLINE void bank_factor(array *a, int rows, int columns, int joining, const t
             const tg_lanes part = lanes_mul(lanes_add(lanes_add(sum[0], sum[1]), lanes_add(sum[2], sum[3])), inverse);
             u[j][i] = part;
             for (k = 0; k < columns; k++) row[k] = lanes_mul_sub(part, own[k], row[k]);
-            if (noise) row[columns] = lanes_sub(bank_zeros(), part);
+            if (noise) row[columns] = lanes_sub(lanes_all(0), part);
         }
         if (noise) a->weight[columns++] = noise[j];
         columns += joining;
@@ -108,7 +108,7 @@ TG_INLINE void bank_predict(const tgi_plan *plan, const tgi_modes *m, array *a, 
 {
     for (int k = 0; k < TG_TWICE(n); k++) {
         tg_lanes from[TG_MAX_STATES], to[TG_MAX_STATES];
-        for (int i = 0; i < TG_TWICE(n); i++) from[i] = i <= k ? m->u[k][i] : bank_zeros();
+        for (int i = 0; i < TG_TWICE(n); i++) from[i] = i <= k ? m->u[k][i] : lanes_all(0);
         bank_map(&plan->passage, from, to, n);
         for (int i = 0; i < TG_TWICE(n); i++) a->W[i][k] = to[i];
         a->weight[k] = m->d[k];
@@ -126,7 +126,7 @@ TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lan
         if (o <= n) S[o] = lanes_add(S[o], noise[n + 1 + o]);
         for (int i = 0; o > n && i <= n; i++) S[o] = lanes_mul_add(lanes_all(h[i] * h[i]), noise[i], S[o]);
         for (int k = 0; k < TG_TWICE(n); k++) {
-            tg_lanes along = o <= n ? a->W[n + 1 + o][k] : bank_zeros();
+            tg_lanes along = o <= n ? a->W[n + 1 + o][k] : lanes_all(0);
             for (int i = 0; o > n && i <= n; i++) along = lanes_mul_add(lanes_all(h[i]), a->W[i][k], along);
             S[o] = lanes_mul_add(lanes_mul(a->weight[k], along), along, S[o]);
         }
@@ -139,10 +139,10 @@ TG_INLINE void bank_update_channel(const tgi_plan *plan, tgi_update *out, int o,
     tgi_modes *const m = &out->state;
     tg_lanes *const K = out->gain[out->used];
     tg_lanes variance = lanes_all(plan->r[o] / out->weight[o]), inverse = lanes_div(lanes_all(1), variance);
-    for (int i = 0; i < TG_TWICE(n); i++) K[i] = bank_zeros();
+    for (int i = 0; i < TG_TWICE(n); i++) K[i] = lanes_all(0);
     for (int k = first; k < TG_TWICE(n); k++) {
         const tg_lanes v = lanes_mul(m->d[k], along[k]), before = variance;
-        const tg_lanes back = lanes_mul(lanes_sub(bank_zeros(), along[k]), inverse);
+        const tg_lanes back = lanes_mul(lanes_sub(lanes_all(0), along[k]), inverse);
         variance = lanes_mul_add(along[k], v, variance);
         inverse = lanes_div(lanes_all(1), variance);
         m->d[k] = lanes_mul(m->d[k], lanes_mul(before, inverse));
@@ -174,7 +174,7 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
     if (!plan->present[n + 1]) return;
     tg_lanes along[TG_MAX_STATES];
     for (int k = 0; k < TG_TWICE(n); k++) {
-        along[k] = bank_zeros();
+        along[k] = lanes_all(0);
         for (int i = 0; i <= n && i <= k; i++) along[k] = lanes_mul_add(lanes_all(h[i]), m->u[k][i], along[k]);
     }
     bank_update_channel(plan, out, n + 1, along, 0, bank_shock(plan, m->x, n), n);
@@ -183,7 +183,7 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
 /* The part of residual b < c in residual c: the channel's row of H times b's gain. */
 TG_INLINE tg_lanes coupling(const tgi_plan *plan, const tgi_update *out, int c, int b, const int n)
 {
-    tg_lanes sum = bank_zeros();
+    tg_lanes sum = lanes_all(0);
     if (out->channel[c] <= n) return out->gain[b][n + 1 + out->channel[c]];
     for (int i = 0; i <= n; i++) sum = lanes_mul_add(lanes_all(plan->accelerometer[i]), out->gain[b][i], sum);
     return sum;
@@ -240,11 +240,11 @@ static tg_real weigh(const tgi_update *out, tg_real *probability)
 
 static int is_finite(const tgi_update *out, int rows)
 {
-    tg_lanes zero = lanes_mul(out->nis, bank_zeros());
+    tg_lanes zero = lanes_mul(out->nis, lanes_all(0));
     for (int k = 0; k < rows; k++) {
-        zero = lanes_mul_add(out->state.x[k], bank_zeros(), zero);
-        zero = lanes_mul_add(out->state.d[k], bank_zeros(), zero);
-        for (int i = 0; i < k; i++) zero = lanes_mul_add(out->state.u[k][i], bank_zeros(), zero);
+        zero = lanes_mul_add(out->state.x[k], lanes_all(0), zero);
+        zero = lanes_mul_add(out->state.d[k], lanes_all(0), zero);
+        for (int i = 0; i < k; i++) zero = lanes_mul_add(out->state.u[k][i], lanes_all(0), zero);
     }
     return lanes_sum(zero) == 0;
 }
@@ -274,7 +274,7 @@ TG_INLINE void work_out(const tg_filter *f, const tgi_plan *plan, int mixes, con
     load(f, &before);
     out->probability = lanes_load(f->policy.bank.probability);
     out->used = 0;
-    out->nis = bank_zeros();
+    out->nis = lanes_all(0);
     out->volume = lanes_all(1);
     if (mixes) mix(f, &before, &out->probability, &a);
     bank_predict(plan, &before, &a, out->state.x, n);
@@ -360,7 +360,7 @@ void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage)
     load(f, &m);
     for (int k = 0; k < f->states; k++) {
         a.weight[k] = m.d[k];
-        for (int i = 0; i <= n; i++) a.W[i][k] = i <= k ? m.u[k][i] : bank_zeros();
+        for (int i = 0; i <= n; i++) a.W[i][k] = i <= k ? m.u[k][i] : lanes_all(0);
     }
     for (int j = 0; j <= n; j++) {
         noise[j] = lanes_mul(scales, lanes_all(passage->q[j]));

@@ -18,14 +18,13 @@ typedef struct {
     int32_t used, channel[TG_MAX_CHANNELS];
 } tgi_update;
 
-TG_INLINE tg_lanes bank_zeros(void) { return lanes_all(0); }
 TG_INLINE tg_real bank_mean(tg_lanes probability, tg_lanes a) { return lanes_sum(lanes_mul(probability, a)); }
 
 /* share[i]: weight of mode i in each mode's mixture, `elapsed` s after the last mixing. The probabilities move by the transition matrix. */
 TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probability, tg_lanes *share)
 {
     const tg_real stay = tgi_exp(-(tg_real)elapsed / f->tuning.dwell), leave = (1 - stay) / (tg_real)(TG_MODES - 1);
-    tg_lanes total = bank_zeros();
+    tg_lanes total = lanes_all(0);
     for (int i = 0; i < TG_MODES; i++) {
         tg_real row[TG_MODES];
         for (int j = 0; j < TG_MODES; j++) row[j] = (i == j ? stay : leave) * lanes_at(*probability, i);
@@ -39,7 +38,7 @@ TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probabi
 /* Means of the modes, mixed; away[i]: of mode i from each mixture. */
 TG_INLINE tg_lanes bank_mix_mean(const tg_lanes *share, tg_lanes x, tg_lanes *away)
 {
-    tg_lanes mixed = bank_zeros();
+    tg_lanes mixed = lanes_all(0);
     for (int i = 0; i < TG_MODES; i++) mixed = lanes_mul_add(share[i], lanes_all(lanes_at(x, i)), mixed);
     for (int i = 0; i < TG_MODES; i++) away[i] = lanes_sub(lanes_all(lanes_at(x, i)), mixed);
     return mixed;

@@ -36,8 +36,7 @@ static tg_real slow(tg_real s)
     return 1 + x * (1 + x * ((tg_real)0.5 + x * ((tg_real)(1.0 / 6) + x * (tg_real)(1.0 / 24))));
 }
 
-/* g(s), odd in slip, on -1 to 1. */
-/* g(s), paper eq. 8 with a = 1. */
+/* g(s), paper eq. 8 with a = 1; odd in slip. */
 static tg_real height_at(tg_real slip)
 {
     const tg_real s = tgi_fabs(slip), g = 1 - TG_CURVE_SHARE * slow(s) - (1 - TG_CURVE_SHARE) * tgi_exp(TG_CURVE_RISE * s);

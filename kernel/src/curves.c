@@ -4,7 +4,7 @@
 /* s. Neighbouring estimates are alike over far longer, so that those in between would teach nothing new. */
 #define TG_CURVE_STEP ((tg_real)0.05)
 
-void tgi_no_curves(tg_estimator *e)
+void tgi_reset_curves(tg_estimator *e)
 {
     const tg_curve unknown = tg_curve_unknown();
     e->curve = unknown;
@@ -18,7 +18,7 @@ void tgi_no_curves(tg_estimator *e)
 tg_status tg_estimator_new_ground(tg_estimator *e)
 {
     if (!e) return TG_BAD_ARGUMENT;
-    tgi_no_curves(e);
+    tgi_reset_curves(e);
     return TG_OK;
 }
 

@@ -14,9 +14,6 @@
 #define TGI_NOISE_SHARE ((tg_real)1e-5)
 #define TGI_FACTOR_STEPS 16 /* with factors, after the bound did not hold */
 
-/* After a step with factors. */
-TG_INLINE void tgi_count_factors(tg_filter *f) { f->factor_steps = f->factor_steps > 0 ? f->factor_steps - 1 : TGI_FACTOR_STEPS; }
-
 typedef struct {
     tg_lanes mu, rest, omega;
 } tgi_gain;

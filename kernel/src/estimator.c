@@ -41,29 +41,22 @@ static tg_real supervisor_of(const tg_estimator *e, const tg_step *step)
     return mean;
 }
 
-/* A channel that the filter trusts much less than usual. A reckoned ground speed or a held wheel speed is no measurement. */
-static int32_t is_outlier(const tg_estimator *e, const tg_row *row, const tg_step *step)
-{
-    const int32_t n = e->settings.machine.wheels, made_up = row->held_wheels | (row->reckoned ? 1 << n : 0);
-    int32_t found = 0;
-    for (int32_t c = 0; c < n + 2; c++) found |= step->weight[c] < e->settings.outlier_weight && !(made_up >> c & 1);
-    return found;
-}
-
-/* NIS of the row and of each measured channel; with a held or reckoned one in it, the row's is the sum of the measured ones'. */
+/* NIS of the row and of each measured channel, and whether the filter trusts one of these much less than usual: the row is an outlier. With
+ * a held wheel speed or a reckoned ground speed in it, which are no measurements, the row's NIS is the sum of the measured channels'. */
 static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step, const tg_real *r)
 {
-    int32_t count = 0, n = e->settings.machine.wheels, made_up = row->held_wheels | (row->reckoned ? 1 << n : 0);
+    int32_t count = 0, n = e->settings.machine.wheels, not_measured = row->held_wheels | (row->reckoned ? 1 << n : 0);
     tg_real sum = 0;
     for (int32_t c = 0; c < n + 2; c++) {
-        if (isnan(step->innovation[c]) || made_up >> c & 1) continue;
+        if (isnan(step->innovation[c]) || not_measured >> c & 1) continue;
         const tg_real w = step->weight[c], shared = c <= n ? row->shared[c] : 0;
         const tg_real variance = step->innovation_variance[c] - shared + (w < 1 ? r[c] * (1 / w - 1) : 0);
         sum += row->channel_nis[c] = tgi_square(step->innovation[c]) / variance;
+        row->outlier |= w < e->settings.outlier_weight;
         count++;
     }
-    e->belief.nis = made_up ? sum : step->nis;
-    e->belief.channels = made_up ? count : step->channels;
+    e->belief.nis = not_measured ? sum : step->nis;
+    e->belief.channels = not_measured ? count : step->channels;
 }
 
 /* The inputs as they were over the step that ends now: means of torque and drawbar force, of loads and slope between its ends. */
@@ -127,7 +120,6 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
     watch_consistency(e, row, &step, r);
     tgi_watch_innovation(e, row, step.innovation[s->machine.wheels], step.innovation_variance[s->machine.wheels]);
     e->belief.supervisor = supervisor_of(e, &step);
-    row->outlier |= is_outlier(e, row, &step);
     return 1;
 }
 
@@ -221,10 +213,7 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     e->scene.disputed = tgi_disputed_variance(e, drive);
     e->scene.late = tgi_late_variance(e, drive);
     tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_MAX_CONSIDERED])e->consider.s, &e->scene, o);
-    o[TG_OUT_NIS] = e->belief.nis;
-    o[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     o[TG_OUT_SUPERVISOR] = e->belief.supervisor;
-    o[TG_OUT_DISTANCE] = (tg_real)out->distance;
     for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
 
@@ -248,13 +237,29 @@ static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
 }
 
 /* What blinds comes first, then what stops the vehicle. */
-static int32_t event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost)
+int32_t tgi_event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost)
 {
     if (lost) return TG_EVENT_RESTART;
-    if (gap) return TG_EVENT_GAP;
+    if (gap || tgi_ground_is_silent(e, row->time)) return TG_EVENT_GAP;
     if (e->standing) return TG_EVENT_STANDSTILL;
     const int32_t watched = tgi_watched(e);
     return watched != TG_EVENT_NONE ? watched : row->outlier ? TG_EVENT_OUTLIER : TG_EVENT_NONE;
+}
+
+/* The row was estimated; its time, way and consistency as outputs have them. */
+void tgi_end_row(tg_estimator *e, const tg_row *row, tg_estimate *out)
+{
+    if (row->measured) {
+        e->seen_motion = 1;
+        e->measured_time = row->time;
+    }
+    e->started = 1;
+    e->time = out->time = row->time;
+    out->distance = e->distance;
+    out->value[TG_OUT_DISTANCE] = (tg_real)e->distance;
+    out->value[TG_OUT_NIS] = e->belief.nis;
+    out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
+    memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
 }
 
 /* Inputs along the travel, in the other direction. */
@@ -287,7 +292,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     if (turned) mirror(&e->held, n);
     tgi_track_turn(e, &row);
     tg_real q[TG_MAX_STATES];
-    tgi_take_inputs(e, &row, dt, &drive);
+    tgi_update_inputs(e, &row, dt, &drive);
     tgi_input_noise(e, &drive, dt, &row, q);
     tgi_loads(e, &row, &drive);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
@@ -301,20 +306,12 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
-    if (row.measured) {
-        e->seen_motion = 1;
-        e->measured_time = row.time;
-    }
-    e->started = 1;
-    e->time = row.time;
+    tgi_end_row(e, &row, out);
     tgi_along(e, &drive, &e->held);
-    out->time = row.time;
-    out->distance = e->distance;
     report(e, &drive, out);
-    memcpy(out->value + TG_OUT_CHANNEL_NIS, row.channel_nis, sizeof row.channel_nis);
     const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
     tgi_watch_over(e, &row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
-    out->event = event_of(e, &row, gap || blind || course == TG_WAIT || tgi_ground_is_silent(e, row.time), lost);
+    out->event = tgi_event_of(e, &row, gap || blind || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
     tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
     return TG_OK;

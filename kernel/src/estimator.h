@@ -72,7 +72,7 @@ typedef struct { /* what drives the model between two rows, in the vehicle's own
     tg_real mass, inverse_mass; /* kg, as measured, else the machine's */
     tg_real hitch_load;   /* N */
     tg_real slope, cosine, sine;
-    tg_real strayed; /* variance that the slope's error gave the ground speed over the step that ends now, (m/s)^2 */
+    tg_real drift_by_slope; /* variance that the slope's error gave the ground speed over the step that ends now, (m/s)^2 */
 } tg_drive;
 
 typedef struct { /* the estimate with its spreads, along the travel; the filter's row order (mu, rho_s, v, omega), see filter.h */
@@ -198,13 +198,12 @@ typedef struct {
     tg_real x[TG_SPEED_STATES], P[TG_SPEED_STATES][TG_SPEED_STATES];
 } tgi_speed_mode;
 
-
 typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
     tg_real variance[TG_SLOTS];     /* noise squared */
     tg_real inverse_inertia[8];
-    tg_real inverse_mass, inverse_weight;
+    tg_real inverse_mass;
     tg_real mean_radius;            /* m */
     tg_real spin_inertia;           /* sum J/r */
     tg_real unknown_torque[8];      /* variance of a torque never seen */
@@ -271,6 +270,13 @@ struct tg_estimator {
 
 TG_INLINE tg_real tgi_square(tg_real x) { return x * x; }
 TG_INLINE tg_real tgi_max(tg_real x, tg_real y) { return x > y ? x : y; }
+/* Variance of what an input does from a sample to the next, beyond its noise; and that a second, as of a random walk. */
+TG_INLINE tg_real tgi_motion(const tg_hold *h, tg_real noise) { return tgi_max(h->level - 2 * noise * noise, 0); }
+TG_INLINE tg_real tgi_walk(const tg_hold *h, tg_real noise) { return h->interval > 0 ? tgi_motion(h, noise) / h->interval : 0; }
+
+/* estimator.c */
+void tgi_end_row(tg_estimator *e, const tg_row *row, tg_estimate *out);
+int32_t tgi_event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost);
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
@@ -287,11 +293,11 @@ tg_real tgi_hitch_spread(const tg_estimator *e);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */
+int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
 void tgi_find_silent(tg_estimator *e, double time);
-void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
-                     int32_t moving);
+void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real dt, tg_real rate);
 void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt);
-void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
+void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 tg_real tgi_chatter(const tg_hold *h, tg_real noise);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
@@ -312,8 +318,7 @@ void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real
 void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 
 /* reckoning.c */
-int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
-void tgi_no_slips(tg_estimator *e);
+void tgi_reset_slips(tg_estimator *e);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
 void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt);
@@ -362,7 +367,7 @@ void tgi_drift(tg_estimator *e, tg_real dt);
 void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);
 
 /* curves.c */
-void tgi_no_curves(tg_estimator *e);
+void tgi_reset_curves(tg_estimator *e);
 void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
 
 /* digging.c */

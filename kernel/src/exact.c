@@ -55,7 +55,7 @@ TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result
     out->used = used + 1;
 }
 
-TG_INLINE void exact_take_output(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int j, const int n, const int stride)
+TG_INLINE void exact_use_output(const tg_filter *f, const tgi_plan *plan, tgi_result *out, int j, const int n, const int stride)
 {
     const int o = j - n - 1;
     tg_real along[TG_ROWS], coupling[TG_MAX_CHANNELS];
@@ -65,7 +65,7 @@ TG_INLINE void exact_take_output(const tg_filter *f, const tgi_plan *plan, tgi_r
     exact_update(f, plan, out, o, along, coupling, j, plan->y[o] - out->x[j], n, stride);
 }
 
-TG_INLINE void exact_take_accelerometer(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
+TG_INLINE void exact_use_accelerometer(const tg_filter *f, const tgi_plan *plan, tgi_result *out, const int n, const int stride)
 {
     const tg_real *const h = plan->accelerometer;
     tg_real along[TG_ROWS], coupling[TG_MAX_CHANNELS], residual = plan->y[n + 1] - plan->accelerometer_shift;
@@ -94,8 +94,8 @@ void tgi_exact_step(const tg_filter *f, const tgi_factors *from, const tgi_plan 
     tgi_gram gram = tgi_factor_begin(W, weight, rows, stride);
     for (int j = rows - 1; j > 0; j--) {
         tgi_factor_row(&gram, j, 1, plan->passage.q[j], out->u + j * stride, out->d + j);
-        if (j > n && plan->count) exact_take_output(f, plan, out, j, n, stride);
+        if (j > n && plan->count) exact_use_output(f, plan, out, j, n, stride);
     }
     tgi_factor_last(&gram, plan->passage.q[0], out->u, out->d);
-    if (plan->count && plan->present[n + 1]) exact_take_accelerometer(f, plan, out, n, stride);
+    if (plan->count && plan->present[n + 1]) exact_use_accelerometer(f, plan, out, n, stride);
 }

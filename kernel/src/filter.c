@@ -167,7 +167,7 @@ TG_INLINE void commit(tg_filter *f, const tgi_result *result, const int n, const
     for (int c = 0; c < result->used; c++)
         for (int i = 0; i < stride; i += TG_LANES) lanes_store(f->gain[c] + i, lanes_load(result->gain[c] + i));
     f->formed = 0;
-    tgi_count_factors(f);
+    f->factor_steps = f->factor_steps > 0 ? f->factor_steps - 1 : TGI_FACTOR_STEPS;
 }
 
 /* What bank and single filter remember alike. */

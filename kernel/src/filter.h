@@ -96,11 +96,10 @@ tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, con
 /* smoother.c: rows of X: row <- row M^-1, by Cholesky of the symmetric M, which is overwritten. 0 where M is not positive definite. */
 int tgi_divide_rows(int states, int stride, tg_real *M, tg_real *X);
 
-/* filter.c: the outputs anew with variances q, the parameters kept and widened by q. */
-void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d);
+/* filter_restart.c */
+void tgi_place_adhesion(tg_filter *f, const tg_real *mu);
 
 /* factor.c */
-void tgi_place_adhesion(tg_filter *f, const tg_real *mu);
 tg_status tgi_factorise(int rows, int stride, const tg_real *P, tg_real *u, tg_real *d);
 void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg_real *P);
 tg_status tgi_factors_of(const tg_filter *f, tg_real *u, tg_real *d); /* without a bank, whichever the filter holds */

@@ -3,8 +3,8 @@
 #include "filter.h"
 #include "lanes.h"
 
-/* The factors of the parameters' marginal with `walk_time` seconds of walk, then of fresh outputs. */
-void tgi_restart(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
+/* The factors of the parameters' marginal, widened by q, then of fresh outputs with variances q. */
+static void restart_factors(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)
 {
     tg_real W[2 * TG_MAX_STATES * TG_ROWS], weight[2 * TG_MAX_STATES];
     const int rows = TG_TWICE(n);
@@ -62,7 +62,7 @@ tg_status tg_filter_restart(tg_filter *f, tg_real walk_time, const tg_real *outp
     else {
         tg_real u[TG_MAX_STATES * TG_ROWS], d[TG_ROWS];
         if (tgi_factors_of(f, u, d) != TG_OK) return TG_DIVERGED;
-        tgi_restart(n, f->stride, passage.q, u, d);
+        restart_factors(n, f->stride, passage.q, u, d);
         memcpy(f->u, u, (size_t)(f->states * f->stride) * sizeof *u);
         memcpy(f->d, d, (size_t)f->states * sizeof *d);
         f->formed = 0;

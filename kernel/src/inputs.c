@@ -7,9 +7,9 @@
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
  * torque's noise would shake omega more than the wheel ever does. */
-static void track(tg_hold *h, tg_real x, tg_real motion, tg_real noise, tg_real interval, tg_real lag)
+static void track(tg_hold *h, tg_real x, tg_real noise, tg_real interval, tg_real lag)
 {
-    tg_real prior = h->variance + (motion > 0 ? motion : 0), gain = prior / (prior + noise * noise);
+    tg_real prior = h->variance + tgi_motion(h, noise), gain = prior / (prior + noise * noise);
     const tg_real least = interval / (lag + interval);
     if (!(gain > least)) gain = least;
     h->value += gain * (x - h->value);
@@ -31,20 +31,20 @@ static void begin(tg_hold *h, tg_real x, tg_real noise)
     h->rate = h->bend = h->spike = 0;
 }
 
-/* Add a sample of an input (NaN: none) at `time`, the row before it being dt old. The mean square of its increments is kept over about
- * 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty, and
- * it enters the mean square clipped. `rate`: the change a second that is no spike, 0 where it is not known; it counts over the usual interval
- * at most, since within a gap nearly everything is possible. Where it is known, a spike is one from the first samples on, else only once
- * the increments are known. `moving`: else the increments are those of a standstill, which show nothing of the start. */
-void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, tg_real dt, tg_real noise, tg_real rate,
-                     int32_t moving)
+/* Add the row's sample at `slot`, if it has one, the row before it being dt old. The mean square of the input's increments is kept over
+ * about 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty,
+ * and it enters the mean square clipped. `rate`: the change a second that is no spike, 0 where it is not known; it counts over the usual
+ * interval at most, since within a gap nearly everything is possible. Where it is known, a spike is one from the first samples on, else only
+ * once the increments are known. Those of a standstill show nothing of the start. */
+void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real dt, tg_real rate)
 {
-    const tg_tuned *const k = &s->tuned;
-    const tg_real interval = (tg_real)(time - h->time);
+    const tg_tuned *const k = &e->settings.tuned;
+    const int32_t moving = !e->standing;
+    const tg_real x = row->value[slot], noise = e->settings.noise[slot], interval = (tg_real)(row->time - h->time);
     h->fresh = 0;
     h->mean = h->calm;
     if (isnan(x)) return;
-    if (h->count == 0 || interval > s->gap + TG_PAUSE * h->interval) begin(h, x, noise);
+    if (h->count == 0 || interval > e->settings.gap + TG_PAUSE * h->interval) begin(h, x, noise);
     else {
         const tg_real before = before_spike(h, x), most = k->spike * k->spike * (h->level + 2 * noise * noise);
         const tg_real usual = h->interval > 0 && h->interval < interval ? h->interval : interval;
@@ -55,7 +55,7 @@ void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, t
             h->mean = h->calm = before;
             change = most;
         } else {
-            track(h, x, h->level - 2 * noise * noise, noise, interval, k->input_lag);
+            track(h, x, noise, interval, k->input_lag);
             h->calm = x;
             h->bend = h->count > 1 ? tgi_square(x - before - h->rate * interval) : 0;
             h->rate = (x - before) / interval;
@@ -69,7 +69,7 @@ void tgi_hold_update(tg_hold *h, const tg_settings *s, tg_real x, double time, t
         h->interval = interval;
     }
     h->raw = x;
-    h->time = time;
+    h->time = row->time;
     if (h->count == 0 || (moving && h->count < 100)) h->count++;
 }
 
@@ -114,14 +114,13 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t am
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
-    const tg_real white = 2 * noise * noise, walk = h->interval > 0 && h->level > white ? (h->level - white) / h->interval : 0;
     if (h->fresh) {
         const tg_real bend = (h->bend > h->bends ? h->bend : h->bends) / 2 - 3 * noise * noise;
         return dt * dt * (noise * noise + (bend > 0 ? bend * dt / (12 * h->interval) : 0));
     }
     const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
     const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
-    return dt * (2 * age - dt) * constant + walk * (age * age * age - since * since * since) / 3;
+    return dt * (2 * age - dt) * constant + tgi_walk(h, noise) * (age * age * age - since * since * since) / 3;
 }
 
 /* Of held_noise, what one step alone does not have where it ends with a sample: its mean leans on the last sample too. */
@@ -175,7 +174,7 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
-    q[n] = walking_forces(e, drive, dt) + drive->strayed;
+    q[n] = walking_forces(e, drive, dt) + drive->drift_by_slope;
     for (int32_t i = 0; i < n; i++)
         if (e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = tgi_chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]) * dt / e->wheel[i].interval;
     memset(row->shared, 0, sizeof row->shared);
@@ -193,15 +192,14 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
 }
 
-void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
+void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
     int32_t driven = 0;
     memset(drive, 0, sizeof *drive);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const int32_t slot = TG_DRIVE_TORQUE + i;
         if (!s->driven[i]) continue;
-        tgi_hold_update(&e->torque[i], s, row->value[slot], row->time, dt, s->noise[slot], 0, !e->standing);
+        tgi_hold_update(e, &e->torque[i], row, TG_DRIVE_TORQUE + i, dt, 0);
         driven++;
     }
     tgi_judge_leaps(e->torque, NULL, s->machine.wheels, driven, row->time, dt);
@@ -212,8 +210,8 @@ void tgi_take_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)
         drive->mean_torque[i] = h->mean;
         row->outlier |= h->spike > 0;
     }
-    tgi_hold_update(&e->drawbar, s, row->value[TG_DRAWBAR_FORCE], row->time, dt, s->noise[TG_DRAWBAR_FORCE], 0, !e->standing);
-    tgi_hold_update(&e->pitch, s, row->value[TG_PITCH], row->time, dt, s->noise[TG_PITCH], 0, !e->standing);
+    tgi_hold_update(e, &e->drawbar, row, TG_DRAWBAR_FORCE, dt, 0);
+    tgi_hold_update(e, &e->pitch, row, TG_PITCH, dt, 0);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.calm;
     drive->mean_drawbar = e->drawbar.mean;

@@ -1,4 +1,4 @@
-/* Vertical loads of axles and wheels (physics.md 3), and the inputs of a row. */
+/* Mass and hitch load of a row, and the vertical loads of axles and wheels (physics.md 3). */
 #include "estimator.h"
 
 #define TG_LEAST_MASS ((tg_real)0.2)  /* of the machine's: bounds of mass and hitch load; beyond them is a defect of the log */
@@ -9,11 +9,11 @@
 /* Update mass or hitch load with a sample, within limits. */
 static void bounded_input(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot, tg_real least, tg_real most)
 {
-    const tg_real x = row->value[slot];
-    const int32_t defect = x < least || x > most;
-    row->outlier |= defect;
-    tgi_hold_update(h, &e->settings, defect ? (tg_real)NAN : x, row->time, 0, e->settings.noise[slot], 0, !e->standing);
-    row->outlier |= h->spike > 0 && h->time == row->time;
+    tg_real *const x = &row->value[slot];
+    const int32_t defect = *x < least || *x > most;
+    if (defect) *x = (tg_real)NAN;
+    tgi_hold_update(e, h, row, slot, 0, 0);
+    row->outlier |= defect || (h->spike > 0 && h->time == row->time);
 }
 
 /* Mass and hitch load of the row: as last measured, else as the machine's file has them. */
@@ -35,9 +35,7 @@ void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive)
 /* Variance of such a value: its noise, and what it may have done from its last sample to the row before. */
 static tg_real held_variance(const tg_hold *h, double time, tg_real noise)
 {
-    const tg_real white = 2 * noise * noise, age = time > h->time ? (tg_real)(time - h->time) : 0;
-    const tg_real walk = h->interval > 0 && h->level > white ? (h->level - white) / h->interval : 0;
-    return h->variance + h->spike + walk * age;
+    return h->variance + h->spike + tgi_walk(h, noise) * (time > h->time ? (tg_real)(time - h->time) : 0);
 }
 
 /* Relative SD of the mass; before its first sample a payload is as unknown as a pull. */
@@ -79,7 +77,7 @@ static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_
     tg_real rest = weight, computed = 0, share = 0;
     for (int32_t k = 0; k < s->axles; k++) {
         tg_hold *h = &e->axle_load[k];
-        tgi_hold_update(h, s, row->value[TG_VERTICAL_LOAD + k], row->time, 0, s->noise[TG_VERTICAL_LOAD + k], 0, !e->standing);
+        tgi_hold_update(e, h, row, TG_VERTICAL_LOAD + k, 0, 0);
         measured[k] = h->count > 0 && row->time - h->time <= 1;
         any |= measured[k];
         if (measured[k]) {

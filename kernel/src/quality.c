@@ -62,10 +62,8 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
     const int32_t n = s->machine.wheels;
     tg_real rate[9] = {0};
     for (int32_t i = 0; i <= n; i++) {
-        const int32_t slot = i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED;
-        tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
         rate[i] = s->tuned.agility * s->machine.gravity / (i < n ? s->rolling_radius[i] : 1);
-        tgi_hold_update(h, s, row->value[slot], row->time, 0, s->noise[slot], rate[i], !e->standing);
+        tgi_hold_update(e, i < n ? &e->wheel[i] : &e->ground, row, i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED, 0, rate[i]);
     }
     tgi_judge_leaps(e->wheel, rate, n, n, row->time, dt);
     for (int32_t i = 0; i <= n; i++) {
@@ -74,22 +72,27 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
         row->outlier |= row->doubt[i] > 0;
     }
     tg_hold *const a = &e->forward;
-    tgi_hold_update(a, s, row->value[TG_ACCELERATION_X], row->time, 0, s->noise[TG_ACCELERATION_X], 0, !e->standing);
+    tgi_hold_update(e, a, row, TG_ACCELERATION_X, 0, 0);
     if (a->spike > 0 && a->time == row->time) {
         row->value[TG_ACCELERATION_X] = (tg_real)NAN;
         row->outlier = 1;
     }
 }
 
-/* First-order low-pass by the backward Euler rule over the time since the last sample; the first sample is used as it is. */
-tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
+/* A low-pass goes on by this share of what a sample is beyond it; the first sample is used as it is. */
+static tg_real go_on(tg_lowpass *f, tg_real x, double time, tg_real gain)
 {
-    if (isnan(x)) return f->value;
-    tg_real dt = (tg_real)(time - f->time);
-    f->value = f->seen ? f->value + dt / (tau + dt) * (x - f->value) : x;
+    f->value = f->seen ? f->value + gain * (x - f->value) : x;
     f->time = time;
     f->seen = 1;
     return f->value;
+}
+
+/* First-order low-pass by the backward Euler rule over the time since the last sample. */
+tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
+{
+    const tg_real dt = (tg_real)(time - f->time);
+    return isnan(x) ? f->value : go_on(f, x, time, dt / (tau + dt));
 }
 
 /* Whether the speed of wheel `place`, or that of the ground where `place` is the number of wheels, was measured lately enough to say how the
@@ -132,10 +135,7 @@ static tg_real settle(tg_lowpass *f, tg_real x, double time, settling *pass)
         pass->dt = dt;
         pass->gain = -tgi_expm1(-dt / pass->tau);
     }
-    f->value = f->seen ? f->value + pass->gain * (x - f->value) : x;
-    f->time = time;
-    f->seen = 1;
-    return f->value;
+    return go_on(f, x, time, pass->gain);
 }
 
 /* A speed, low-passed only until its noise is a quarter of the threshold of standstill, and not longer than tau. */
@@ -143,12 +143,8 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
 {
     if (isnan(x)) return f->value;
     const tg_real ratio = tgi_square(threshold / (4 * noise)), dt = (tg_real)(time - f->time), slow = dt / (tau + dt);
-    tg_real gain = f->seen && ratio < 1 ? 2 * ratio / (1 + ratio) : 1;
-    if (gain < slow) gain = slow;
-    f->value += gain * (x - f->value);
-    f->time = time;
-    f->seen = 1;
-    return f->value;
+    const tg_real gain = ratio < 1 ? 2 * ratio / (1 + ratio) : 1;
+    return go_on(f, x, time, tgi_max(gain, slow));
 }
 
 /* Low-passed speeds decide standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis

@@ -3,7 +3,7 @@
  * ahead: what the vehicle usually slips, and how far from that it was while this was measured, take its place. */
 #include "estimator.h"
 
-void tgi_no_slips(tg_estimator *e)
+void tgi_reset_slips(tg_estimator *e)
 {
     tgi_slip_memory *m = &e->slip_memory;
     m->slip = m->usual = e->settings.tuned.first_slip;

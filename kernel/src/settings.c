@@ -262,7 +262,6 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     c->force_walk = force_walk(s);
     c->mounting_walk = s->tuned.mounting_walk / T;
     c->inverse_mass = 1 / m->mass;
-    c->inverse_weight = 1 / weight;
     c->pace = tgi_pace(s);
     place_wheels(s, c);
     tgi_place_trends(s, c);
@@ -336,9 +335,9 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     work_out_constants(settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
-    tgi_no_slips(e);
+    tgi_reset_slips(e);
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
-    tgi_no_curves(e);
+    tgi_reset_curves(e);
     tgi_believe(e);
     return TG_OK;
 }

@@ -21,11 +21,11 @@ static tg_real predict(tgi_slope *s, const tg_settings *settings, tg_real pitch,
     const tg_real g = settings->machine.gravity, k = g * dt;
     const tg_real noise = tgi_square(settings->noise[TG_ACCELERATION_X]) * dt + force; /* of shocks that its noise does not hold */
     s->speed += dt * (s->acceleration - g * (tgi_sin(pitch) + s->error));
-    const tg_real strayed = k * (k * s->error_variance - 2 * s->covariance);
-    s->speed_variance += strayed + noise * dt;
+    const tg_real drift_by_slope = k * (k * s->error_variance - 2 * s->covariance);
+    s->speed_variance += drift_by_slope + noise * dt;
     s->covariance -= k * s->error_variance;
     s->error_variance += walk * dt;
-    return strayed;
+    return drift_by_slope;
 }
 
 /* Take a ground speed of this variance. */
@@ -53,8 +53,8 @@ void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real
     const int32_t sensed = e->pitch.count > 0;
     const tg_real walk = sensed ? e->constants.mounting_walk : settings->tuned.terrain_walk * tgi_fabs(s->speed) / e->constants.mean_radius;
     if (s->running && (dt > settings->gap || row->time - e->acceleration.time > 1)) s->running = 0;
-    const tg_real strayed = s->running && dt > 0 ? predict(s, settings, pitch, walk, e->constants.force_walk, dt) : 0;
-    drive->strayed = sensed ? 0 : strayed; /* a mounting is a constant, and considered */
+    const tg_real drift_by_slope = s->running && dt > 0 ? predict(s, settings, pitch, walk, e->constants.force_walk, dt) : 0;
+    drive->drift_by_slope = sensed ? 0 : drift_by_slope; /* a mounting is a constant, and considered */
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
         if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED] + row->doubt[settings->machine.wheels]);

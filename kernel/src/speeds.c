@@ -289,7 +289,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     if (e->standing) tgi_rest_reading(e, row);
     else tgi_rest_over(e);
     if (!e->started) e->ground_time = row->time;
-    tgi_hold_update(&e->ground, &e->settings, row->value[TG_GROUND_SPEED], row->time, 0, e->settings.noise[TG_GROUND_SPEED], 0, !e->standing);
+    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, 0, 0);
     tgi_reckon_speeds(e, dt, row);
     samples_of(e, row, s, &in);
     e->belief.nis = 0;
@@ -299,31 +299,15 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     for (int32_t k = row->reckoned; k < in.count; k++) s->seen[in.given[k]] = 1;
     if (!gap && !e->standing) tgi_remember_speeds(e, row, dt);
     if (!gap && !e->standing) e->distance += (double)((travelled + tgi_fabs(s->x[0])) / 2 * dt);
-    if (row->measured) {
-        e->seen_motion = 1;
-        e->measured_time = row->time;
-    }
     const int32_t first = !e->started;
-    e->started = 1;
-    e->time = row->time;
+    tgi_end_row(e, row, out);
 
     s->slow = tgi_slow_variance(e) + tgi_alike_variance(e) + tgi_max(e->scene.reckoned - s->P[0][0], 0);
     tgi_speeds_report(&e->settings, s, out->value);
-    out->time = row->time;
-    out->distance = e->distance;
-    out->value[TG_OUT_DISTANCE] = (tg_real)e->distance;
-    out->value[TG_OUT_NIS] = e->belief.nis;
-    memcpy(out->value + TG_OUT_CHANNEL_NIS, row->channel_nis, sizeof row->channel_nis);
-    out->value[TG_OUT_CHANNELS] = (tg_real)e->belief.channels;
     const int32_t open = is_blind(s, n);
     e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]) + s->slow;
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
-    const int32_t watched = tgi_watched(e);
-    out->event = (gap && !first) || open || tgi_ground_is_silent(e, row->time) ? TG_EVENT_GAP
-               : e->standing                ? TG_EVENT_STANDSTILL
-               : watched != TG_EVENT_NONE   ? watched
-               : row->outlier               ? TG_EVENT_OUTLIER
-                                            : TG_EVENT_NONE;
+    out->event = tgi_event_of(e, row, (gap && !first) || open, 0);
 }
 
 /* ---- smoothing: a row's record is its tgi_speeds ---- */

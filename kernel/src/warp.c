@@ -14,22 +14,22 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
     tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0, work = 0;
-    int32_t found = 0, driven = 0, merely = 0;
+    int32_t count = 0, driven = 0, unpowered = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
     for (int32_t i = 0; i < n; i++) {
         c->inverse_radius[i] = 1 / s->rolling_radius[i];
         c->pulls[i] = s->driven[i] ? 1 : 0;
         driven += s->driven[i] != 0;
-        merely |= s->driven[i] && !c->watched[i];
+        unpowered |= s->driven[i] && !c->watched[i];
         whole += weight[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
     }
     for (int32_t a = 0; a < TG_TRENDS && driven; a++) {
-        tg_real *const trend = trends[found], square = 0;
+        tg_real *const trend = trends[count], square = 0;
         for (int32_t i = 0; i < n; i++) {
             const tg_real along = longest > 0 ? s->load_transfer[s->wheel_axle[i]] / longest : 0;
             trend[i] = a == 0 ? 1 : a == 1 ? along : (tg_real)c->side[i];
         }
-        for (int32_t b = 0; b < found; b++) {
+        for (int32_t b = 0; b < count; b++) {
             tg_real share = 0;
             for (int32_t i = 0; i < n; i++) share += by_trend[b][i] * trend[i];
             for (int32_t i = 0; i < n; i++) trend[i] -= share * trends[b][i];
@@ -37,9 +37,9 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
         for (int32_t i = 0; i < n; i++) square += weight[i] / whole * tgi_square(trend[i]);
         for (int32_t i = 0; i < n; i++) {
             trend[i] *= square > TG_IN_LINE && s->driven[i] ? 1 / tgi_sqrt(square) : 0;
-            by_trend[found][i] = weight[i] / whole * trend[i];
+            by_trend[count][i] = weight[i] / whole * trend[i];
         }
-        found += square > TG_IN_LINE;
+        count += square > TG_IN_LINE;
     }
     for (int32_t j = 0; j < n && driven; j++) {
         c->at_rest[j] = weight[j] / whole;
@@ -47,14 +47,14 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
         work += c->watched_share[j];
         for (int32_t i = 0; i < n; i++) {
             c->beyond[j][i] = i == j;
-            for (int32_t a = 0; a < found; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
+            for (int32_t a = 0; a < count; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
             c->beyond[j][i] *= c->pulls[i];
         }
     }
     for (int32_t j = 0; j < n && work > 0; j++) c->watched_share[j] /= work;
     c->work = work > 0 ? work : 1;
-    c->warps = driven - found;
-    c->slopes = found > 1 && !(merely && c->warps) ? found - 1 : 0; /* see hidden.c */
+    c->warps = driven - count;
+    c->slopes = count > 1 && !(unpowered && c->warps) ? count - 1 : 0; /* see hidden.c */
     c->share = driven ? 1 / (tg_real)driven : 0;
 }
 

@@ -13,10 +13,10 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
     for (int32_t i = 0; i < n; i++) {
         const tg_hold *const h = &e->wheel[i];
         const tg_real noise = e->settings.noise[TG_WHEEL_SPEED + i], x = row->value[TG_WHEEL_SPEED + i];
-        const tg_real age = (tg_real)(row->time - h->time), motion = h->level - 2 * noise * noise;
+        const tg_real age = (tg_real)(row->time - h->time);
         if (!isnan(x) || h->count < 2 || h->spike > 0 || age > e->settings.tuned.wheel_late * h->interval || !(dt > 0)) continue;
         row->value[TG_WHEEL_SPEED + i] = h->raw;
-        row->wheel_variance[i] = (noise * noise + (motion > 0 ? motion * age / h->interval : 0)) * (h->interval / dt > 1 ? h->interval / dt : 1);
+        row->wheel_variance[i] = (noise * noise + tgi_motion(h, noise) * age / h->interval) * (h->interval / dt > 1 ? h->interval / dt : 1);
         row->held_wheels |= 1 << i;
     }
 }
