@@ -194,6 +194,16 @@ class Vehicle(Part):
         )
 
     @cached_property
+    def radii(self) -> dict[str, float]:
+        """`wheel_radius` [m] by the wheel's name."""
+        return dict(zip(self.wheels, self.wheel_radius.tolist(), strict=True))
+
+    @cached_property
+    def driven_radii(self) -> dict[str, float]:
+        """Those of the driven wheels."""
+        return {wheel: self.radii[wheel] for wheel, on in zip(self.wheels, self.driven, strict=True) if on}
+
+    @cached_property
     def wheel_inertia(self) -> Floats:
         """Moment of inertia of each wheel with its drive (n,) [kg m²]."""
         return _frozen(np.array([wheel.inertia for wheel in self.wheel_data]))

@@ -49,6 +49,12 @@ def test_a_receiver_and_all_wheels_that_read_0_are_named() -> None:
     )
 
 
+def test_a_reference_force_is_no_speed() -> None:
+    """A wheel-force sensor that reads 0 now and then was said to be a speed with zeros for missing values."""
+    force = np.where(np.arange(len(TIME)) % 10 == 3, 0.0, 50.0)
+    assert dropout_warnings(log(wheel_force_x_l=force)) == []
+
+
 @pytest.mark.parametrize("name", ["ground_speed", "wheel_speed_l"])
 def test_zeros_for_values_that_were_not_there_are_named(name: str) -> None:
     """With every tenth ground speed 0 slip was .3 beyond the truth, and nothing was said."""

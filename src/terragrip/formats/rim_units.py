@@ -190,10 +190,9 @@ def _kind_by_axles(
         for axle in vehicle.axles.values()
         if axle.driven and set(axle.wheels) & columns.keys()
     ]
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
     found: set[tuple[str, ...] | None] = set()
     for first, second in combinations(axles, 2):
-        by_radii = float(np.log(radius[second[0]] / radius[first[0]]))
+        by_radii = float(np.log(vehicle.radii[second[0]] / vehicle.radii[first[0]]))
         rows = _together(evidence, [columns[wheel] for wheel in (*first, *second)])
         if abs(by_radii) < _UNEQUAL or rows is None or len(first) != len(second):
             continue

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.recording.held import held_period
 from terragrip.recording.lag import Lag, delay_of, is_copy, lag_within, measured
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median
 from terragrip.recording.survey import ROWS, first_speeds
 from terragrip.recording.table import Recording
-
-Floats = npt.NDArray[np.float64]
 
 _LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
 

@@ -11,8 +11,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.physics.loads import axle_loads
 from terragrip.recording.mechanics import Means
 from terragrip.recording.ranks import median, quantile
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 _LEAST = 15  # windows
 _PULLING = 0.5  # of the thrust that a twentieth of the windows exceed
@@ -92,17 +91,16 @@ def _beyond(difference: float, steepest: float) -> float:
 
 def _by_axle(
     recording: Recording, vehicle: Vehicle, means: Means, driven: list[int]
-) -> tuple[dict[int, Floats], dict[int, Floats], npt.NDArray[np.bool_]]:
+) -> tuple[dict[int, Floats], dict[int, Floats], Bools]:
     """Thrust [N] and slip of each axle (n,), and the windows without a turn."""
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
     axles, channels = list(vehicle.axles.values()), recording.channels
     thrust, slip = {}, {}
     straight = np.ones(len(means.speed), dtype=bool)
     for k in driven:
-        rims = [radius[w] * means.of(channels[f"wheel_speed_{w}"]) for w in axles[k].wheels]
+        rims = [vehicle.radii[w] * means.of(channels[f"wheel_speed_{w}"]) for w in axles[k].wheels]
         rim = np.mean(rims, axis=0)
         thrust[k] = np.sum(
-            [means.of(channels[f"drive_torque_{w}"]) / radius[w] for w in axles[k].wheels], axis=0
+            [means.of(channels[f"drive_torque_{w}"]) / vehicle.radii[w] for w in axles[k].wheels], axis=0
         )
         slip[k] = 1 - means.speed / np.where(rim > 0, rim, np.nan)
         straight &= np.isfinite(slip[k]) & (np.ptp(rims, axis=0) < _STRAIGHT * np.abs(rim))
@@ -122,7 +120,7 @@ def _pulls(recording: Recording, vehicle: Vehicle, means: Means, total: Floats) 
 
 def _difference(
     thrust: dict[int, Floats], vehicle: Vehicle, masses: Floats, means: Means, pull: Floats,
-    rows: npt.NDArray[np.bool_], pair: tuple[int, int],
+    rows: Bools, pair: tuple[int, int],
 ) -> float:  # fmt: skip
     """The logarithm of one axle's thrust over load, over that of another: median of the windows; 0 where one brakes or lifts."""
     climb = 0.0 if means.climb is None else np.nan_to_num(means.climb)

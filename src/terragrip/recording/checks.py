@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, nearest
 from terragrip.recording.clock import clock_unit
 from terragrip.recording.ranks import median
@@ -17,7 +17,6 @@ from terragrip.recording.schema import LABELS, TIME, is_channel
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 MASSES = (0.2, 10.0)
 """What a measured mass may be of the vehicle file's; the kernel passes over others (loads.c)."""

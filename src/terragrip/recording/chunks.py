@@ -7,7 +7,8 @@ can be chosen during the pass, before the log's length is known.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from terragrip.arrays import Ints
 
 CHUNK = 12_500
 """Rows of a chunk."""
@@ -15,7 +16,7 @@ CHUNKS = 16
 """Chunks that are kept at most, and more than half as many of a log that has more."""
 
 
-def sampled_rows(rows: int) -> slice | npt.NDArray[np.intp]:
+def sampled_rows(rows: int) -> slice | Ints:
     """The sample of a log's ``rows``: all if they are `CHUNKS` chunks at most, else every 2^k-th chunk."""
     chunks, every = -(-rows // CHUNK), 1
     if chunks <= CHUNKS:

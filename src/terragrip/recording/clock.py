@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
+
 if TYPE_CHECKING:
     import pandas as pd
 
-Floats = npt.NDArray[np.float64]
 
 LATEST = 7.25e9
 """s since 1970, in 2199: what is beyond is a clock in another unit."""

@@ -55,8 +55,8 @@ def _limit(name: str, vehicle: Vehicle | None) -> float | None:
         return _FASTEST
     quantity, wheel = split_channel(name) or ("", "")
     radius = 1.0 if quantity == "drive_torque" else _SMALLEST
-    if vehicle is not None and vehicle.knows_wheels and wheel in vehicle.wheels:
-        radius = float(vehicle.wheel_radius[vehicle.wheels.index(wheel)])
+    if vehicle is not None and vehicle.knows_wheels:
+        radius = vehicle.radii.get(wheel, radius)
     if quantity == "wheel_speed":
         return _FASTEST / radius
     if vehicle is None:

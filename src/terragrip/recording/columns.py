@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
 from terragrip.written_times import doubt, misfit, times_of
-
-Floats = npt.NDArray[np.float64]
 
 
 def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:

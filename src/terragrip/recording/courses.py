@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from terragrip.arrays import Floats
 from terragrip.recording.ranks import median
-
-Floats = npt.NDArray[np.float64]
 
 STEP = 0.05
 """Time [s] between the points, at least."""

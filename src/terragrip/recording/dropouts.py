@@ -13,7 +13,7 @@ from terragrip.recording.lag import measured
 from terragrip.recording.mechanics import PULL, Means
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.schema import rim_names
+from terragrip.recording.schema import rim_names, speed_names
 from terragrip.recording.stretches import DRIVING, LONG, is_one_value, longest, may_last
 from terragrip.units import STANDARD_GRAVITY
 
@@ -162,7 +162,7 @@ def _torques(recording: Recording) -> list[str]:
 
 def _blinks(recording: Recording) -> list[str]:
     """A sentence on each speed that is 0 for single samples while another speed continues: zeros in place of missing values."""
-    speeds = {n: v for n, v in recording.channels.items() if n == "ground_speed" or n.startswith("wheel_")}
+    speeds = {name: recording.channels[name] for name in speed_names(recording.channels)}
     ground, notes = speeds.get("ground_speed"), []
     rims = [v for n, v in speeds.items() if n != "ground_speed" and np.isfinite(v).any()]
     if ground is None or not rims or not np.isfinite(ground).any():

@@ -16,7 +16,6 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import quantile
-from terragrip.recording.rolling import driven_radii
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 
@@ -76,7 +75,7 @@ class Courses:
         names = (
             [n for n in channels if n.startswith("wheel_speed_")]
             if vehicle is None
-            else [f"wheel_speed_{w}" for w in driven_radii(vehicle)]
+            else [f"wheel_speed_{w}" for w in vehicle.driven_radii]
         )
         if found is None or not names or not _known(recording, "ground_speed", *names):
             return None
@@ -90,7 +89,7 @@ class Courses:
         def calm(values: Floats) -> Floats:
             return smooth(values, _CALM, step)
 
-        radii = {} if vehicle is None else driven_radii(vehicle)
+        radii = {} if vehicle is None else vehicle.driven_radii
         rim = calm(np.mean([radii.get(n[12:], 1.0) * at(n) for n in names], axis=0))
         speed = calm(at("ground_speed"))
         if vehicle is None:  # without radii: as fast as the ground, on average

@@ -33,16 +33,15 @@ def free_axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return []
     speed = np.abs(filled(recording.time, ground))
     rows = straight_rows(recording, vehicle) & (speed > _MOVING * quantile(speed, 0.95))
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
     rolled = {name: _rolled(recording, axle, speed, rows) for name, axle in axles.items()}
     known = {name: turn for name, turn in rolled.items() if turn is not None}
     for free in (name for name in known if not axles[name].driven):
-        own = known[free] * radius[axles[free].wheels[0]]
+        own = known[free] * vehicle.radii[axles[free].wheels[0]]
         for driven in (name for name in known if axles[name].driven):
-            other = known[driven] * radius[axles[driven].wheels[0]]
+            other = known[driven] * vehicle.radii[axles[driven].wheels[0]]
             exchanged = (
-                known[driven] * radius[axles[free].wheels[0]],
-                known[free] * radius[axles[driven].wheels[0]],
+                known[driven] * vehicle.radii[axles[free].wheels[0]],
+                known[free] * vehicle.radii[axles[driven].wheels[0]],
             )
             is_odd = np.log(own / other) > _FASTER or abs(np.log(own)) > _ROLLS
             if is_odd and abs(np.log(exchanged[0])) < _ALIKE and exchanged[1] > exchanged[0]:

@@ -9,6 +9,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part, quantum, usual_values
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
 def frozen_warnings(recording: Recording) -> list[str]:
     """Sentences on a ground speed or an acceleration that never changes while the wheels do, and on speeds, torques and a drawbar force
     that repeat a value for long, as a receiver does that lost its fix, or a logger whose bus went silent."""
-    speeds = _speeds(recording)
+    speeds = {name: recording.channels[name] for name in speed_names(recording.channels)}
     ground = recording.channels.get("ground_speed")
     rims = [name for name in speeds if name != "ground_speed"]
     notes = []
@@ -87,11 +88,6 @@ def _hung(recording: Recording) -> list[str]:
     return [
         f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
     ]
-
-
-def _speeds(recording: Recording) -> dict[str, Floats]:
-    names = ("ground_speed", "wheel_based_speed")
-    return {n: v for n, v in recording.channels.items() if n in names or n.startswith("wheel_speed_")}
 
 
 def _metric(speeds: dict[str, Floats]) -> list[Floats]:

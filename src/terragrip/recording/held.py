@@ -15,8 +15,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.chunks import sampled_rows
 from terragrip.recording.ranks import median
 from terragrip.recording.schema import REFERENCE
@@ -24,7 +24,6 @@ from terragrip.recording.schema import REFERENCE
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
 _FEWEST_RUNS = 8
 _REGULAR_SHARE = 0.6
@@ -73,7 +72,7 @@ def held_period(time: Floats, values: Floats) -> float | None:
     return float(lasting[alike & ((lasting < 1.7 * typical) | (median(lengths) < 2))].mean())
 
 
-def fresh_samples(time: Floats, values: Floats, period: float) -> npt.NDArray[np.bool_]:
+def fresh_samples(time: Floats, values: Floats, period: float) -> Bools:
     """Which samples (n,) of a channel held for ``period`` [s] are true updates.
 
     A changed value is one. A value held for longer than 1.5 periods counts again, once a period, where
@@ -153,5 +152,5 @@ def known_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     return (time, values) if known.all() else (time[known], values[known])
 
 
-def _run_starts(values: Floats) -> npt.NDArray[np.intp]:
+def _run_starts(values: Floats) -> Ints:
     return np.r_[0, np.flatnonzero(values[1:] != values[:-1]) + 1]

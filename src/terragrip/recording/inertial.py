@@ -10,18 +10,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.lag import STIFFNESS, measured
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.turns import side_differences
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 _LAG = 0.1  # s, and a sample: tyres and filters
 _WITHIN = 2.0  # s, and five samples: the largest lag searched
@@ -64,19 +64,14 @@ def _courses(
         return None if known is None else np.interp(points, *known)
 
     read = {w: at(f"wheel_speed_{w}") for w in vehicle.wheels}
-    radii = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
-    rims = {w: radii[w] * turning for w, turning in read.items() if turning is not None}
+    rims = {w: vehicle.radii[w] * turning for w, turning in read.items() if turning is not None}
     if not rims:
         return None
     rim = np.mean(list(rims.values()), axis=0)
     fast = np.abs(rim) > _MOVING * quantile(np.abs(rim), 0.95)
     if not fast.any():
         return None
-    sides = [
-        rims[axle.wheels[-1]] - rims[axle.wheels[0]]
-        for axle in vehicle.axles.values()
-        if len(axle.wheels) > 1 and {axle.wheels[0], axle.wheels[-1]} <= rims.keys()
-    ]
+    sides = side_differences(vehicle, rims)
     shown = {"acceleration_x": np.gradient(smooth(rim, CALM, step), step)}
     if sides:
         shown["angular_velocity_z"] = np.mean(sides, axis=0)

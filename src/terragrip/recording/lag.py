@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats, Ints
 from terragrip.recording.held import fresh_samples, held_period, known_part
 from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
-
-Floats = npt.NDArray[np.float64]
 
 _STEP = 0.05  # s between the points on which speeds are compared
 _BRIDGED = 1.0  # s, or three samples, between two samples
@@ -250,7 +249,7 @@ def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
     return float(time[0]), values
 
 
-def _correlation(a: Floats, b: Floats, lags: npt.NDArray[np.intp]) -> Floats:
+def _correlation(a: Floats, b: Floats, lags: Ints) -> Floats:
     """Correlation of a (n,) with b (m,) over their common part, at lags of b by whole points (k,), increasing."""
     from numpy.fft import irfft, rfft
 

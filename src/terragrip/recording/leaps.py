@@ -19,7 +19,6 @@ from terragrip.recording.held import known_part
 from terragrip.recording.mechanics import PULL
 from terragrip.recording.noise import MAD_TO_SD
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.rolling import driven_radii
 from terragrip.recording.schema import unit_of
 from terragrip.recording.stretches import DRIVING, LONG, gaps
 from terragrip.recording.turns import filled
@@ -64,7 +63,7 @@ class _Drive:
 
 def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence on each force, or torques at once, whose leap nothing in the balance of forces answers."""
-    channels, radii = recording.channels, driven_radii(vehicle)
+    channels, radii = recording.channels, vehicle.driven_radii
     drive = _drive_of(recording)
     if drive is None or not radii or not all(f"drive_torque_{wheel}" in channels for wheel in radii):
         return []

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.pitch import pitch_warnings
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.rolling import driven_radii, radius_warnings
+from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 _WINDOW = 1.0  # s, at least, and two samples of the ground speed
 _MOVING = 0.15  # of the speed that a twentieth of the windows exceed
@@ -74,7 +72,7 @@ class Means:
     of which each is ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch),
     ``climb`` [m/s²], if the log has it."""
 
-    place: npt.NDArray[np.intp]
+    place: Ints
     count: int
     rows: Bools
     change: Floats
@@ -164,7 +162,7 @@ def means_of(recording: Recording) -> Means | None:
 
 def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str, Floats]:
     """For each driven wheel its thrust less its share of the drawbar force, over the mass (n,) [m/s²]; empty if a torque is missing."""
-    radii, channels = driven_radii(vehicle), recording.channels
+    radii, channels = vehicle.driven_radii, recording.channels
     if not all(f"drive_torque_{wheel}" in channels for wheel in radii):
         return {}
     pulled = means.of(channels["drawbar_force"]) / len(radii) if "drawbar_force" in channels else 0.0
@@ -323,7 +321,7 @@ def _offset_warnings(means: Means, forward: Floats) -> list[str]:
 def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Wheels' channels with one value for the whole drive while other wheels' change."""
     notes = []
-    for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(driven_radii(vehicle)))):
+    for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(vehicle.driven_radii))):
         known = {f"{quantity}_{wheel}": recording.channels.get(f"{quantity}_{wheel}") for wheel in wheels}
         held = {
             name: v[np.isfinite(v)] for name, v in known.items() if v is not None and np.isfinite(v).any()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.recording.held import fresh_samples, held_periods, measured_part, quantum, usual_values
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import REFERENCE
@@ -14,7 +14,6 @@ from terragrip.recording.schema import REFERENCE
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
 _FEWEST = 20
 _ENOUGH = 20_000  # third differences: their median is then known to a per cent

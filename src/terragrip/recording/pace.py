@@ -132,8 +132,8 @@ def _whole(time: Floats, values: Floats) -> Floats:
 
 def _rims(recording: Recording, vehicle: Vehicle) -> list[tuple[float, Floats]]:
     """Radius and speed (n,) [rad/s] of the wheels that have one."""
-    radii = {f"wheel_speed_{w}": float(r) for w, r in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)}
-    known = [(r, recording.channels[name]) for name, r in radii.items() if name in recording.channels]
+    named = [(radius, f"wheel_speed_{wheel}") for wheel, radius in vehicle.radii.items()]
+    known = [(radius, recording.channels[name]) for radius, name in named if name in recording.channels]
     filled_up = [(radius, _whole(recording.time, values)) for radius, values in known]
     return [(radius, values) for radius, values in filled_up if np.isfinite(values[:1]).all()]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from terragrip.recording.mechanics import Means
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _SURE = 3.0  # standard errors

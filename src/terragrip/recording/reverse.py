@@ -14,7 +14,7 @@ from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
 from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import longest
-from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
+from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, side_differences, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -81,11 +81,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             ]
         return []
     yaw = channels.get("angular_velocity_z")
-    sides = [
-        rims[axle.wheels[-1]] - rims[axle.wheels[0]]
-        for axle in vehicle.axles.values()
-        if len(axle.wheels) > 1 and {axle.wheels[0], axle.wheels[-1]} <= rims.keys()
-    ]
+    sides = side_differences(vehicle, rims)
     if yaw is None or not sides:
         return []
     turn, shown = windows(time, np.array([np.mean(sides, axis=0), yaw]))

@@ -34,12 +34,6 @@ _RADII = 0.01  # radii that are known so well are right
 _SLOWER = 0.1  # of the hub's speed: radii are known to that
 
 
-def driven_radii(vehicle: Vehicle) -> dict[str, float]:
-    """Radius of each driven wheel."""
-    wheels = zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True)
-    return {wheel: float(radius) for wheel, radius, driven in wheels if driven}
-
-
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     """Slip with hardly any torque, and none with much; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
     return _free(recording, vehicle, means) or _against_the_pull(recording, vehicle, means)
@@ -48,7 +42,7 @@ def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> lis
 def _free(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     off: dict[str, float] = {}
-    for wheel, radius in driven_radii(vehicle).items():
+    for wheel, radius in vehicle.driven_radii.items():
         torque, rolled = recording.channels.get(f"drive_torque_{wheel}"), _rolled(recording, wheel, means)
         if rolled is None or torque is None:
             continue
@@ -60,7 +54,7 @@ def _free(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
         return []
     apparent, stated = (
         float(np.median(list(off.values()))),
-        float(np.median([driven_radii(vehicle)[w] for w in off])),
+        float(np.median([vehicle.driven_radii[w] for w in off])),
     )
     return [
         f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, more than any ground allows: they roll "
@@ -80,7 +74,7 @@ def _rolled(recording: Recording, wheel: str, means: Means) -> Floats | None:
 
 def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     """Rims that go slower than the ground straight ahead, all while they pull."""
-    radii, channels = driven_radii(vehicle), recording.channels
+    radii, channels = vehicle.driven_radii, recording.channels
     rolled = {w: _rolled(recording, w, means) for w in radii}
     known = {w: way for w, way in rolled.items() if way is not None}
     if not radii or len(known) < len(radii) or not all(f"drive_torque_{w}" in channels for w in radii):
@@ -114,7 +108,7 @@ def slower_warnings(
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
     least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     found: dict[str, tuple[float, float]] = {}
-    for wheel, radius in driven_radii(vehicle).items():
+    for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
         if spin is None or torque is None:
             continue
@@ -129,7 +123,7 @@ def slower_warnings(
     first, last = max(found.values(), key=lambda stretch: stretch[1] - stretch[0])
     what = (
         "ground_speed, or all wheels' speeds, are"
-        if len(found) == len(driven_radii(vehicle))
+        if len(found) == len(vehicle.driven_radii)
         else "their speeds are"
     )
     return [

@@ -63,6 +63,13 @@ def rim_names(names: Iterable[str]) -> list[str]:
     return [name for name in names if name == "wheel_based_speed" or name.startswith("wheel_speed_")]
 
 
+def speed_names(names: Iterable[str]) -> list[str]:
+    """The columns of the ground speed, of wheels' speeds and of the drive train's."""
+    names = tuple(names)
+    rims = rim_names(names)
+    return [name for name in names if name == "ground_speed" or name in rims]
+
+
 def has_engine_torque(names: Collection[str]) -> bool:
     """Whether the engine's speed and torque are among the columns."""
     return "engine_speed" in names and not {"engine_torque", "engine_torque_share"}.isdisjoint(names)

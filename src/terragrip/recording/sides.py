@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
 from terragrip.units import STANDARD_GRAVITY
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 _LEAST = 15  # windows of 2 s
 _DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
@@ -94,7 +93,7 @@ class _Drive:
     axles: tuple[_Axle, ...]
     pace: Floats
     hubs: Floats
-    driving: npt.NDArray[np.bool_]
+    driving: Bools
     turned: float
 
     @classmethod
@@ -125,10 +124,7 @@ class _Drive:
 
 def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_Axle], Floats]:
     """Axles of two sides with both speeds known, and the turn, as means over the windows that have them all."""
-    radius, channels = (
-        dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True)),
-        recording.channels,
-    )
+    radius, channels = vehicle.radii, recording.channels
     rows: list[Floats] = [turn]
     found: list[tuple[str, tuple[str, str], float, int, bool]] = []
     for name, axle in vehicle.axles.items():
@@ -153,7 +149,7 @@ def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_
     return axles, means[0]
 
 
-def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
+def _rolling(axle: _Axle, straight: Bools) -> list[str]:
     """Rims with different speeds straight ahead."""
     left, right = axle.rims[:, straight]
     if straight.sum() < _LEAST or (right == 0).any():
@@ -172,7 +168,7 @@ def _rolling(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
     ]
 
 
-def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
+def _opposed(axle: _Axle, straight: Bools) -> list[str]:
     """Torques that rise on one side where they fall on the other, straight ahead."""
     if axle.pulls is None or straight.sum() < _LEAST:
         return []
@@ -193,7 +189,7 @@ def _opposed(axle: _Axle, straight: npt.NDArray[np.bool_]) -> list[str]:
     ]
 
 
-def _share(axle: _Axle, pulls: Floats, straight: npt.NDArray[np.bool_]) -> float | None:
+def _share(axle: _Axle, pulls: Floats, straight: Bools) -> float | None:
     """The logarithm of an axle's left pull over its right one, None where it is not steady.
 
     Where it pulls little an offset of a torque would count as much as its scale: there, of the pulls' changes.
@@ -212,7 +208,7 @@ def _share(axle: _Axle, pulls: Floats, straight: npt.NDArray[np.bool_]) -> float
     )
 
 
-def _uneven(axles: tuple[_Axle, ...], straight: npt.NDArray[np.bool_]) -> list[str]:
+def _uneven(axles: tuple[_Axle, ...], straight: Bools) -> list[str]:
     """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike."""
     shares: dict[str, tuple[float, _Axle]] = {}
     for axle in axles:

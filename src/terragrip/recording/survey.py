@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.recording.chunks import CHUNK, CHUNKS, sampled_rows
 from terragrip.recording.lag import delay_of, lag_within
+from terragrip.recording.schema import speed_names
 from terragrip.recording.table import Recording
-
-Floats = npt.NDArray[np.float64]
 
 ROWS = 200_000
 """Rows of a block, where a recording is cut into blocks."""
@@ -120,11 +119,7 @@ def first_speeds(blocks: Sequence[Recording]) -> tuple[Floats, dict[str, Floats]
 
 def _speeds_of(block: Recording) -> Recording:
     """A block's speeds alone."""
-    wanted = ("wheel_speed_", "wheel_based")
-    return Recording(
-        block.time,
-        {n: v for n, v in block.channels.items() if n == "ground_speed" or n.startswith(wanted)},
-    )
+    return Recording(block.time, {name: block.channels[name] for name in speed_names(block.channels)})
 
 
 def _copied(block: Recording, rows: slice) -> Recording:

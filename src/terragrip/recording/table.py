@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

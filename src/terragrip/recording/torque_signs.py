@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.recording.ranks import median
-from terragrip.recording.rolling import driven_radii
 from terragrip.recording.turns import filled
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
@@ -33,7 +32,7 @@ _AS_HARD = 0.5  # of the braking thrust, with the other sign: a motor that is of
 
 def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence where no torque is ever below 0 and the motion shows that the wheels braked, or drove backward, as hard as they pulled."""
-    radii, channels = driven_radii(vehicle), recording.channels
+    radii, channels = vehicle.driven_radii, recording.channels
     names = [f"drive_torque_{wheel}" for wheel in radii]
     ground = channels.get("ground_speed")
     if not names or ground is None or not all(name in channels for name in names):

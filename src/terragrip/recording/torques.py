@@ -2,7 +2,7 @@
 
 At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust follows
 the sum of the first two at once; a lag is an error of a channel, and so is a thrust that no ground bears, or a pull of another unit.
-Scales of all three are told apart in starts and stops (forces.py). Where a tool pulls unmeasured, the thrust follows an unknown force.
+Starts and stops distinguish the scales of all three (forces.py). Where a tool pulls unmeasured, the thrust follows an unknown force.
 """
 
 from __future__ import annotations
@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import quantile
-from terragrip.recording.rolling import driven_radii
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 
 _MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground supports
 _LEAST = 0.02  # of the weight: a thrust that is hardly ever exceeded; tires on a road need .01, and starts more (right logs: .07 at least)
@@ -105,12 +103,12 @@ class _Course:
     step: float
     thrust: Floats
     force: Floats
-    moving: npt.NDArray[np.bool_]
+    moving: Bools
 
     @classmethod
     def of(cls, recording: Recording, vehicle: Vehicle) -> _Course | None:
         """None where a torque or a wheel speed is missing, or the log is short."""
-        radii, channels, time = driven_radii(vehicle), recording.channels, recording.time
+        radii, channels, time = vehicle.driven_radii, recording.channels, recording.time
         names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
         if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
             return None

@@ -7,15 +7,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.ranks import median
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
 WINDOW = 2.0
 """Length [s] of the stretch to which a parabola is fitted; five fixes at least. Longer: less noise, and turns rounded off."""
@@ -42,7 +41,7 @@ class Track:
     speed: Floats
     turn: Floats
     altitude: Floats
-    gap: npt.NDArray[np.bool_]
+    gap: Bools
 
     @cached_property
     def grade(self) -> Floats:
@@ -109,9 +108,7 @@ def _altitude(recording: Recording, time: Floats) -> Floats:
     return np.interp(time, recording.time[known], altitude[known])
 
 
-def _fitted(
-    at: Floats, values: Floats, rows: npt.NDArray[np.intp], span: int, degree: int
-) -> tuple[Floats, Floats]:
+def _fitted(at: Floats, values: Floats, rows: Ints, span: int, degree: int) -> tuple[Floats, Floats]:
     """Coefficients (n, 1 + degree) of polynomials through the `span` samples around each of rows (n,), about that sample, and their SDs
     from the scatter of all."""
     parts = [
@@ -123,7 +120,7 @@ def _fitted(
     return np.asarray(result / scale), np.asarray(spread / scale)
 
 
-def _around(values: Floats, rows: npt.NDArray[np.intp], span: int) -> Floats:
+def _around(values: Floats, rows: Ints, span: int) -> Floats:
     """The `span` values around each of rows (n,), less the one there: (n, span)."""
     shown = np.lib.stride_tricks.sliding_window_view(values, span)
     return np.asarray(shown[rows - span // 2] - values[rows, None])

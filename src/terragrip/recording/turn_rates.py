@@ -83,9 +83,8 @@ def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
     shown = yaw[np.isfinite(yaw)]
     if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
         return False
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
     speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
-    rims = [radius[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
+    rims = [vehicle.radii[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
     if not rims:
         return False
     apart, pace = windows(
@@ -147,7 +146,7 @@ def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> 
 def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
     """Yaw rate (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` selects rim speeds."""
     parts = []
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True)) if rims else {}
+    radius = vehicle.radii if rims else {}
     for axle in vehicle.axles.values():
         left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
         if len(axle.wheels) > 1 and left is not None and right is not None:

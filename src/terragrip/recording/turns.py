@@ -6,20 +6,19 @@ need equal torques. A log with two exchanged wheels contradicts that, and exchan
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
 Order = tuple[int, ...]
 Axles = list[tuple[int, int]]
 
@@ -48,6 +47,12 @@ def filled(time: Floats, values: Floats) -> Floats:
     return np.interp(time, time[known], values[known]) if known.any() and not known.all() else values
 
 
+def side_differences(vehicle: Vehicle, rims: Mapping[str, Floats]) -> list[Floats]:
+    """Of each axle whose outer wheels are both among ``rims`` (n,), the right one's less the left one's."""
+    outer = [(axle.wheels[0], axle.wheels[-1]) for axle in vehicle.axles.values() if len(axle.wheels) > 1]
+    return [rims[right] - rims[left] for left, right in outer if {left, right} <= rims.keys()]
+
+
 def agreement(time: Floats, yaw: Floats, other: Floats) -> float:
     """Correlation about 0 of two rates of turn (n,) over windows of 2 s; 0 where there is little turning."""
     known = np.isfinite(yaw) & np.isfinite(other)
@@ -74,14 +79,14 @@ def _correlation(a: Floats, b: Floats) -> float:
     return float(np.sum(a * b)) / size if size else 0.0
 
 
-def straight_rows(recording: Recording, vehicle: Vehicle) -> npt.NDArray[np.bool_]:
+def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
     """Rows (n,) in which the rims of each axle have like speeds from side to side, so no turn moves one far from the ground speed; if
     there are hardly any, those in which they turn the same way."""
     rows, forward = np.ones((2, len(recording)), dtype=bool)
-    radius = dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
     for axle in vehicle.axles.values():
         sides = [
-            (recording.channels.get(f"wheel_speed_{w}"), radius[w]) for w in (axle.wheels[0], axle.wheels[-1])
+            (recording.channels.get(f"wheel_speed_{w}"), vehicle.radii[w])
+            for w in (axle.wheels[0], axle.wheels[-1])
         ]
         rims = [r * filled(recording.time, speed) for speed, r in sides if speed is not None]
         if len(axle.wheels) > 1 and len(rims) == 2:

@@ -6,15 +6,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from terragrip.arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
-
-def window_means(values: Floats, place: npt.NDArray[np.intp], count: int) -> Floats:
+def window_means(values: Floats, place: Ints, count: int) -> Floats:
     """Mean of the measured ``values`` (n,) in each of ``count`` windows, NaN where there are none; ``place`` (n,): each value's window."""
     known = np.isfinite(values)
     if not known.all():

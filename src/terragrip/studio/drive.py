@@ -46,7 +46,7 @@ def radii(table: Estimates) -> dict[str, float]:
     vehicle = table.vehicle
     if not vehicle.knows_wheels:
         return {}
-    known = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
+    known = dict(vehicle.radii)
     if DRIVE in table.wheels:
         known[DRIVE] = supposed_radius(vehicle)
     zero = table.about.get("zero_slip", {})
