@@ -63,5 +63,5 @@ def _adhesion(
     for i in range(n):
         settings.tuning.walk[n + 1 + i] *= adhesion
     settings.tuning.walk[2 * n + 1] *= resistance
-    estimator._engine = Engine(settings, estimator.engine.slots_in, estimator.engine.index_out)
+    estimator._engine = Engine(settings, estimator.engine.slots_in, estimator.engine.slots_out)
     return np.asarray(estimator.update_block(recording)[f"adhesion_{wheel}"])

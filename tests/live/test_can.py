@@ -69,8 +69,8 @@ def test_what_is_missing_is_not_available(vehicle):
 
     estimator = TractionEstimator(vehicle)
     values = [float("nan")] * len(estimator.update({"time": 0.0}).values)
-    values[estimator.engine.index_out["slip_fl"]] = 40.0
-    row = Row(0.0, {}, Estimate(0.0, "gap", values, estimator.engine.index_out), predicted=True)
+    values[estimator.engine.slots_out["slip_fl"]] = 40.0
+    row = Row(0.0, {}, Estimate(0.0, "gap", values, estimator.engine.slots_out), predicted=True)
     frames = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface",)}, "sink"), vehicle).frames(
         row
     )

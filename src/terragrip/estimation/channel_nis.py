@@ -38,7 +38,7 @@ def estimate_with_channel_nis(
     log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
     estimator = TractionEstimator.for_recording(log, vehicle, method, sensors=sensors)
     places = _places(estimator.engine.slots_in)
-    estimator.engine.index_out.update(places)
+    estimator.engine.slots_out.update(places)
     time, columns = prepared(estimator, log)
     out = table_of((*estimator.columns, *places), len(time))
     event = np.empty(len(time), dtype=np.uint8)

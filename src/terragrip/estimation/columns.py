@@ -13,6 +13,11 @@ class Column(NamedTuple):
     unit: str
     description: str
 
+    @property
+    def label(self) -> str:
+        """The description with the unit, where it has one."""
+        return f"{self.description} [{self.unit}]" if self.unit else self.description
+
 
 _WHOLE = {
     "time": Column("s", "time on the log's own clock"),

@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 
+NORMAL_95 = 1.959963984540054
+"""Half of a normal distribution's central 95 % interval, in standard deviations."""
+
 
 @dataclass(frozen=True)
 class Agreement:

@@ -143,7 +143,7 @@ class DrivenMachine:
 
     def radius(self, wheel: str) -> float:
         """Radius [m] of ``driven`` or ``undriven``."""
-        return float(self.vehicle.wheel_radius[self.vehicle.wheels.index(wheel)])
+        return self.vehicle.radii[wheel]
 
     def converted(
         self, time: Floats, given: Mapping[str, Floats], before: int
@@ -219,8 +219,7 @@ def machine_of(estimates: Estimates, vehicle: Vehicle) -> Vehicle:
     if "driveline" not in estimates.about or vehicle.driveline is None:
         return vehicle
     made = estimates.vehicle
-    radius = float(made.wheel_radius[made.wheels.index(DRIVEN)])
-    return Vehicle.from_dict(lumped(vehicle, (radius, made.uncertainty.wheel_radius or 0.0)))
+    return Vehicle.from_dict(lumped(vehicle, (made.radii[DRIVEN], made.uncertainty.wheel_radius or 0.0)))
 
 
 _REPLACED = ("wheel_speed_", "wheel_based_speed", "vertical_load_", "engine_")
@@ -230,7 +229,7 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
     """A vehicle file's data of the machine with its driven wheels as one and its free ones as another.
 
     Each has its wheels' mean radius and the sum of their equivalent masses; its axle has their masses, at their mean position.
-    ``zero``: radius [m] of the driven one at zero slip and its relative SD, where the log tells them.
+    ``zero``: radius [m] of the driven one at zero slip and its relative SD, where the log shows them.
     """
     radii, data = wheel_radii(vehicle)[1], vehicle.to_dict()
     position, mass = vehicle.axle_to_rear, vehicle.axle_mass

@@ -81,11 +81,11 @@ class Engine:
     """
 
     def __init__(self, settings: Any, slots_in: Mapping[str, int], slots_out: Mapping[str, int]) -> None:
-        self.slots_in, self._slots_out = dict(slots_in), dict(slots_out)
-        self._used = 1 + max(self._slots_out.values())
+        self.slots_in, self.slots_out = dict(slots_in), dict(slots_out)
+        self._used = 1 + max(self.slots_out.values())
         self.inputs = tuple(self.slots_in)
-        self.outputs = tuple(self._slots_out)
-        self.filtered_only = tuple(name for name, slot in self._slots_out.items() if not _is_smoothed(slot))
+        self.outputs = tuple(self.slots_out)
+        self.filtered_only = tuple(name for name, slot in self.slots_out.items() if not _is_smoothed(slot))
         self._size = lib.tg_estimator_size(settings.tuning.policy)
         self._memory = ffi.new("char[]", self._size + 64)
         address = int(ffi.cast("uintptr_t", self._memory))
@@ -98,7 +98,6 @@ class Engine:
             )
         self.sample = ffi.new("tg_sample *")
         self.estimate = ffi.new("tg_estimate *")
-        self.index_out = self._slots_out
         names: list[Any] = [None] * lib.TG_SLOTS  # no sample has a column None
         for name, slot in self.slots_in.items():
             names[slot] = name
@@ -121,7 +120,7 @@ class Engine:
         return status
 
     def values(self) -> list[float]:
-        """The numbers in ``self.estimate``, a column of `outputs` at each place of ``index_out``."""
+        """The numbers in ``self.estimate``, a column at each of the places of ``slots_out``."""
         result: list[float] = ffi.unpack(self.estimate.value, self._used)
         return result
 
@@ -140,7 +139,7 @@ class Engine:
         """
         rows = len(time)
         sources = {self.slots_in[name]: values for name, values in columns.items()}
-        targets = {self._slots_out[name]: values for name, values in out.items()}
+        targets = {self.slots_out[name]: values for name, values in out.items()}
         done = ffi.new("size_t *")
         for first in range(0, rows, _BLOCK):
             last = min(first + _BLOCK, rows)
@@ -176,7 +175,7 @@ class Engine:
         self, records: Floats, following: Floats | None, carry: Floats, out: Mapping[str, Floats]
     ) -> None:
         """Overwrite ``out`` by the smoothed values; ``following`` is the record behind the last row."""
-        targets = _pointers({self._slots_out[k]: v for k, v in out.items()}, lib.TG_OUT_SLOTS, 0)
+        targets = _pointers({self.slots_out[k]: v for k, v in out.items()}, lib.TG_OUT_SLOTS, 0)
         behind = ffi.NULL if following is None else _pointer(following, 0)
         rows = len(records)
         _require(

@@ -36,7 +36,7 @@ class EngineEstimator(TractionEstimator):
     """As `TractionEstimator`, of samples with engine torque and no wheel's: the sum of the drive torques by the vehicle's ``driveline``.
 
     ``machine`` says how (`DrivenMachine`); ``vehicle`` is its machine of driven wheels, whose columns the estimates have. ``fixed``: what
-    the bus tells of its engine later changes nothing.
+    the bus sends of its engine later changes nothing.
     """
 
     def __init__(

@@ -13,7 +13,7 @@ from terragrip.errors import InputError, nearest
 from terragrip.estimation import rims as speeds
 from terragrip.estimation.engine import EVENTS, Engine, estimate_slots, refusal
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
-from terragrip.estimation.noise import DELAY, channel_noise
+from terragrip.estimation.noise import DELAY, channel_noise, settings_in
 from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
@@ -92,6 +92,8 @@ class TractionEstimator:
     gap: s without any wheel or ground speed after which the motion restarts.
     standstill_speed: m/s under which vehicle and wheels count as standing.
     together: how many wheels each wheel of ``vehicle`` represents (`terragrip.estimation.driveline`).
+    rims, dead_band: of slip alone, what an earlier log showed of its wheels, and the speed [m/s] below which they read 0; default: the
+        vehicle file's radii, and 0.
 
     Raises InputError on an unknown method or sensor, or a vehicle that the kernel cannot work with.
 
@@ -109,30 +111,28 @@ class TractionEstimator:
         gap: float | None = None,
         standstill_speed: float | None = None,
         together: int = 1,
+        rims: Collection[Rim] = (),
+        dead_band: float = 0.0,
     ) -> None:
         self.vehicle = vehicle
         self.method = method_named(method).name
         self.held = dict(held or {})
+        self.dead_band = dead_band
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed, together=together)
         self.slip_reference: SlipReference | None = None
         self.turn: ShownTurn | None = None
-        self.rims: tuple[Rim, ...] = ()
         self._accepted: set[str] = set()
-        if speeds_alone(self.channels, vehicle):
-            self.method = SLIP_ONLY.name
+        self.rims = tuple(rims)
+        if not self.rims and speeds_alone(self.channels, vehicle):
             self.rims = rims_of(vehicle, self.channels)
-        self._start(sensors)
-
-    def _start(self, sensors: Mapping[str, float] | None, dead_band: float = 0.0) -> None:
-        self.dead_band = dead_band
-        slots = speeds.slots_in(self.rims) if self.rims else sample_slots(self.vehicle)
-        self.noise, self.guessed = channel_noise(self.vehicle, tuple(slots), sensors)
-        out = (
-            speeds.slots_out(self.rims)
-            if self.rims
-            else estimate_slots(self.vehicle, adaptive=method_named(self.method).adapts)
-        )
+        if self.rims:
+            self.method = SLIP_ONLY.name
+            slots, out = speeds.slots_in(self.rims), speeds.slots_out(self.rims)
+        else:
+            slots = sample_slots(vehicle)
+            out = estimate_slots(vehicle, adaptive=method_named(self.method).adapts)
+        self.noise, self.guessed = channel_noise(vehicle, tuple(slots), sensors)
         self._engine = Engine(self._settings(), slots, out)
 
     def _settings(self) -> Any:
@@ -158,7 +158,6 @@ class TractionEstimator:
     ) -> Self:
         """An estimator set up as :func:`estimate` does it: noise and held channels that are not given are determined from the
         log. Without a torque in the log the zero of slip is determined, too (``slip_reference``; None: from the log)."""
-        from terragrip.estimation.noise import settings_in
         from terragrip.estimation.slip_only import slip_reference_in
 
         logged, periods = settings_in(recording, vehicle, sensors=sensors, held=held)
@@ -168,7 +167,8 @@ class TractionEstimator:
             mine[DELAY] = delay_of(lag_within(recording.time, recording.channels)) if known is None else known
         if slip_reference is None and speeds_alone(recording.channels, vehicle):
             slip_reference = slip_reference_in(recording, vehicle)
-        used = sample_slots(vehicle) if slip_reference is None else speeds.slots_in(slip_reference.rims)
+        rims = () if slip_reference is None else slip_reference.rims
+        used = speeds.slots_in(rims) if rims else sample_slots(vehicle)
         logged = {name: sd for name, sd in logged.items() if name in used}
         made = cls(
             vehicle,
@@ -179,10 +179,10 @@ class TractionEstimator:
             gap=gap,
             standstill_speed=standstill_speed,
             together=together,
+            rims=rims,
+            dead_band=0.0 if slip_reference is None else slip_reference.dead_band,
         )
-        if slip_reference is not None:
-            made.slip_reference, made.rims = slip_reference, slip_reference.rims
-            made._start({**logged, **mine}, slip_reference.dead_band)
+        made.slip_reference = slip_reference
         return made
 
     @property
@@ -193,7 +193,7 @@ class TractionEstimator:
     @property
     def places(self) -> dict[str, int]:
         """Index of each column in an estimate's values."""
-        return self._engine.index_out
+        return self._engine.slots_out
 
     @property
     def engine(self) -> Engine:
@@ -249,7 +249,7 @@ class TractionEstimator:
         """The kernel's latest estimate."""
         engine = self._engine
         out = engine.estimate
-        return Estimate(out.time, EVENTS[out.event], engine.values(), engine.index_out)
+        return Estimate(out.time, EVENTS[out.event], engine.values(), engine.slots_out)
 
     def _update_known(self, time: float, sample: Mapping[str, float | None]) -> int:
         """A sample with None values; raises InputError on a value that is not a number."""
@@ -318,10 +318,9 @@ class TractionEstimator:
             gap=about["gap"],
             standstill_speed=about["standstill_speed"],
             together=about.get("together", 1),
+            rims=[Rim(**rim) for rim in about["rims"]],
+            dead_band=about["dead_band"],
         )
-        if about["rims"]:
-            restored.rims = tuple(Rim(**rim) for rim in about["rims"])
-            restored._start(about["noise"], about["dead_band"])
         restored.guessed = tuple(about["guessed"])
         restored._engine.restore(body[4 + length :])
         return restored

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,8 +95,6 @@ def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float])
     }
     if not silent:
         return {}
-    from dataclasses import replace
-
     return sensor_noise(replace(recording, channels=silent), {k: v for k, v in held.items() if k in silent})
 
 

@@ -14,7 +14,7 @@ from terragrip.estimation.engine import OF_FORCES, SIGNS
 from terragrip.estimation.methods import SLIP_ONLY
 from terragrip.estimation.noise import DELAY
 from terragrip.estimation.settings import WITHOUT_TORQUE, Thresholds, put_axles, wheel_radii
-from terragrip.estimation.zero_slip import UNTOLD, Zero
+from terragrip.estimation.zero_slip import UNDETERMINED, Zero
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording.schema import has_torque
 from terragrip.vehicle import Vehicle
@@ -72,7 +72,7 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
         )
     supposed, calibrated = supposed_radius(vehicle), calibrated_scale(vehicle)
     if calibrated is None:
-        calibrated, spread = 1.0, UNTOLD if stated is None else stated
+        calibrated, spread = 1.0, UNDETERMINED if stated is None else stated
     return (
         Rim(
             DRIVE,

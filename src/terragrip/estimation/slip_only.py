@@ -42,9 +42,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     is compared with the log's own zero, unless the vehicle's calibration gives the radii.
     """
     rims, zero, notes = [], {}, [WHAT_IS_MISSING]
-    radii = (
-        dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True)) if vehicle.knows_wheels else {}
-    )
+    radii = vehicle.radii if vehicle.knows_wheels else {}
     for rim in rims_of(vehicle, log.channels, log.source):
         at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius, radii=radii)
         if at is not None:

@@ -1,6 +1,6 @@
 """A backward pass over a whole recording: every row then also uses the rows after it (Rauch, Tung and Striebel 1965).
 
-Memory stays bounded. The forward pass keeps a snapshot every few thousand rows and puts each block aside; then, from the last block
+Memory stays bounded. The forward pass keeps a snapshot every few thousand rows and puts each block on disk; then, from the last block
 to the first, a restored estimator writes the records of some rows and they are smoothed. All blocks but the newest wait on disk.
 """
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.forward import finished, flag_before_gaps, prepared, table_of
-from terragrip.estimation.put_aside import Aside
+from terragrip.estimation.stack_on_disk import StackOnDisk
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
@@ -52,16 +52,16 @@ def smoothed(
 
     ``estimator`` must not be `algebraic`; it stands after the last row when this ends. ``nis``, ``supervisor``,
     ``adaptation_<state>``, ``distance``, loads and events are those of the forward pass. Neither the blocks nor ``step`` change the
-    result. ``beside``: see `terragrip.estimation.put_aside`. ``forward`` and ``backward`` are called with the rows done.
+    result. ``beside``: see `terragrip.estimation.stack_on_disk`. ``forward`` and ``backward`` are called with the rows done.
     """
     engine = estimator.engine
-    with Aside(beside) as filtered, Aside(beside) as finals:
+    with StackOnDisk(beside) as filtered, StackOnDisk(beside) as finals:
         last, rows = None, 0
         for block in blocks:
             done = _filter(estimator, block, step, lambda k, before=rows: forward(before + k))  # type: ignore[misc]
             flag_before_gaps(done.event, None if last is None else last.event)
             if last is not None:
-                filtered.put(last)
+                filtered.push(last)
             last, rows = done, rows + len(block)
         if last is None:
             return
@@ -73,12 +73,12 @@ def smoothed(
             backward(rows - count)
             if not len(filtered):
                 break
-            finals.put(result)
-            last = filtered.finish()
+            finals.push(result)
+            last = filtered.pop()
         engine.restore(end)
         yield result
         while len(finals):
-            yield finals.finish()
+            yield finals.pop()
 
 
 def _filter(estimator: TractionEstimator, block: Recording, step: int, forward: Done) -> _Forward:

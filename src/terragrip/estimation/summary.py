@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.grouped import quantities
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -57,7 +58,7 @@ class Tally:
         moving = np.flatnonzero(block.event_codes == 0)
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
         chosen = chosen[:: self._every]
-        for name in (n for n in quantities(self.wheels) if n in block):
+        for name in quantities(block):
             for column in (name, f"{name}_std"):
                 self.sample.setdefault(column, []).append(block[column][chosen])
         soil = block.labels.get("soil")
@@ -110,12 +111,3 @@ class Tally:
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """The sampled rows of each quantity that is summarised, and ``label``, the soil of each row."""
         return {name: np.concatenate(parts) for name, parts in self.sample.items()}
-
-
-def quantities(wheels: tuple[str, ...]) -> list[str]:
-    """Columns that are summarised."""
-    return [
-        "ground_speed",
-        "soil_resistance",
-        *(f"{quantity}_{wheel}" for quantity in ("slip", "adhesion", "efficiency") for wheel in wheels),
-    ]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.engine import EVENTS
 from terragrip.note_pages import with_page
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 Columns = dict[str, npt.NDArray[Any]]
 
-NORMAL_95 = 1.959963984540054
 _EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
 _MOST_LABELS = 8  # rows of the table
 _SHOWN = ("slip", "adhesion", "efficiency")

@@ -43,7 +43,7 @@ class ShownTurn:
 def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownTurn | None, list[str]]:
     """The rate of turn by the positions, where no sensor measures how fast the machine turns, and a sentence on it.
 
-    ``sample``: rows of the log, by which it is judged whether the machine turned where nothing tells how fast.
+    ``sample``: rows of the log, by which it is judged whether the machine turned where nothing shows how fast.
     """
     channels = sample.channels
     rims = rims_of(vehicle, channels)
@@ -86,7 +86,7 @@ def _silences(log: Recording) -> Floats:
 
 
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
-    """A sentence on a rate of turn that is missing, or silent: the estimator then takes the drive for straight."""
+    """A sentence on a rate of turn that is missing, or silent: the estimator then assumes straight driving."""
     if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
         return []
     names = [*(rim.channel for rim in rims), *([_YAW_RATE] if _YAW_RATE in log.channels else [])]

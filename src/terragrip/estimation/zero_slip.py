@@ -29,7 +29,7 @@ WINDOW = 5.0
 """Length [s] of the windows that speeds are averaged over: a lag of .2 s between the two speeds then hardly counts."""
 FEWEST = 8
 """Windows that are needed: 40 s."""
-UNTOLD = 0.03
+UNDETERMINED = 0.03
 """Relative SD of a radius that no log shows, only the machine: worn or other tires, other pressure."""
 
 _ALIKE: Mapping[str, float] = MappingProxyType({})  # wheels of one radius
@@ -42,7 +42,7 @@ _ROAD = 5.0  # m/s: faster than any work in the soil
 _PLAUSIBLE = 0.15  # a radius is not further off than this; units are
 _NEAR = 0.05  # a radius is seldom further off than this
 _BEHIND = (
-    1.5 * UNTOLD
+    1.5 * UNDETERMINED
 )  # from here on a log of two loads without light work is as likely as light work by such a radius (R)
 _LIGHT = 0.002  # SD of the slip in light work from place to place
 # Slip of wheels that carry their vehicle alone, by ASABE D497 at zero net traction: .2 to .3 % on firm ground (mobility number 80 to 55),
@@ -109,20 +109,20 @@ def _judged(ratio: Floats, fast: Bools) -> Zero:
     std = float(np.sqrt(spread**2 / (count / 2) + _LIGHT**2 + (_SELF_ROAD if of_road else _SELF_FIELD) ** 2))
     if abs(value - 1) > _PLAUSIBLE:
         why = f"ground speed is {value:.3g} times wheel speed even in the lightest work: check the units and the radius"
-        return Zero(1.0, UNTOLD, count, why)
+        return Zero(1.0, UNDETERMINED, count, why)
     if of_road or (len(modes) > 1 and 1 - value <= _BEHIND):
         return Zero(value, std, count)
     if len(modes) > 1:
         why = f"it is {1 - value:.0%} below the supposed radius: another radius or, as likely, lighter field work: {REMEDY}"
-        return Zero(value, float(np.hypot(std, max(UNTOLD, (1 - value) / 2))), count, why)
+        return Zero(value, float(np.hypot(std, max(UNDETERMINED, (1 - value) / 2))), count, why)
     if abs(value - 1) <= _NEAR:
         why = f"all windows slip alike, so light work cannot be distinguished from field work: {REMEDY}"
-        return Zero(value, float(np.hypot(std, UNTOLD)), count, why)
+        return Zero(value, float(np.hypot(std, UNDETERMINED)), count, why)
     why = (
         f"all windows slip alike and are {abs(1 - value):.0%} {'below' if value < 1 else 'above'} the supposed radius: another "
         f"radius or, as likely, field work: {REMEDY}"
     )
-    return Zero(1.0, UNTOLD, count, why)
+    return Zero(1.0, UNDETERMINED, count, why)
 
 
 def _error(ratio: Floats) -> float:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from terragrip.estimation import Estimates, estimate
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.vehicle_maker.drive import drive
 from terragrip.vehicle_maker.fields import fields
 from terragrip.vehicle_maker.maker import Made, vehicle_of
 
 QUANTITIES = ("slip", "adhesion", "soil_resistance", "net_traction")
-NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)

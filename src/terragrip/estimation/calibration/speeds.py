@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from terragrip.estimation.calibration.result import Calibration, Evidence, Quantity, Unknown
-from terragrip.estimation.zero_slip import UNTOLD, WINDOW, Span, Zero, zero_of
+from terragrip.estimation.zero_slip import UNDETERMINED, WINDOW, Span, Zero, zero_of
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
@@ -24,14 +24,13 @@ def calibrate_radii(
     """
     quantities: list[Quantity | Unknown] = []
     if vehicle.knows_wheels:
-        radii = dict(zip(vehicle.wheels, vehicle.wheel_radius.tolist(), strict=True))
         for wheel, data, driven in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True):
             channel, radius = f"wheel_speed_{wheel}", data.radius
             if not any(channel in log for log in logs):
                 if not driven:
                     continue
                 channel, radius = "wheel_based_speed", 1.0
-            zero = zero_of(logs, channel, radius, light, radii)
+            zero = zero_of(logs, channel, radius, light, vehicle.radii)
             radius_of = Quantity(
                 "wheel_radius", data.radius, 0.0, "m", _evidence(logs, sources, channel), "", wheel=wheel
             )
@@ -52,7 +51,7 @@ def _scaled(stated: Quantity, zero: Zero | None) -> Quantity | Unknown:
     """What the vehicle file states (a radius, or a gain, its inverse) at the zero of slip."""
     if zero is None:
         return Unknown(stated.name, "too few windows of steady motion; 40 s without load are needed")
-    if zero.std >= UNTOLD and zero.ratio == 1:
+    if zero.std >= UNDETERMINED and zero.ratio == 1:
         return Unknown(stated.name, zero.doubt)
     sentence = (
         f"ground speed over wheel speed in {zero.windows} windows of the lightest work, taken as zero slip"

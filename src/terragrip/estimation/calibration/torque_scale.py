@@ -11,7 +11,7 @@ vehicle's resistance in turns is a term of its own. Resistance that grows with s
 slip, where it grows fastest, do not count, and its prior is in the interval. (As a term of the regression it would absorb thrust
 itself, since slip follows thrust more closely than Y does.) A slope that nothing measures is in the interval as far as it correlates
 with another speed or pull. Resistance that varies with the grade (wet below, dry above) would appear as a larger K, too, the more the grade
-makes of Y: it is in the interval. So is what a fit by short stretches says otherwise where no label tells the soils: a tool pulls harder
+makes of Y: it is in the interval. So is what a fit by short stretches says otherwise where no label names the soils: a tool pulls harder
 where the wheels sink deeper.
 
 Errors in Y would pull K towards 0. Where there are two measures of dv/dt + g sinθ, the accelerometer and ground speed with
@@ -28,9 +28,10 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
-from terragrip.estimation.calibration.result import NORMAL_95, Evidence, Quantity
+from terragrip.estimation.calibration.result import Evidence, Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
 from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.physics.loads import GRAVITY
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording, without_held

@@ -61,9 +61,8 @@ def estimate_schema(names: tuple[str, ...]) -> dict[str, Any]:
     properties: dict[str, Any] = {}
     for name in names:
         column = column_named(name)
-        label = f"{column.description} [{column.unit}]" if column.unit else column.description
         kind = "string" if not column.unit and column.description else ["number", "null"]
-        properties[name] = {"type": kind, "description": label}
+        properties[name] = {"type": kind, "description": column.label}
     return {"title": "terragrip.TractionEstimate", "type": "object", "properties": properties}
 
 

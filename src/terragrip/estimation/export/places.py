@@ -116,11 +116,8 @@ def _layer(part: Estimates) -> Any:
     table = part.to_arrow().drop_columns(list(_PLACE)).replace_schema_metadata(None)
     points = np.zeros(len(part), dtype=_POINT)
     points["order"], points["type"], points["x"], points["y"] = 1, 1, part["longitude"], part["latitude"]
-    arrays, fields = list(table.columns), []
-    for field in table.schema:
-        column = column_named(field.name)
-        label = f"{column.description} [{column.unit}]" if column.unit else column.description
-        fields.append(field.with_metadata({"GDAL:OGR:comment": label}))
+    arrays = list(table.columns)
+    fields = [f.with_metadata({"GDAL:OGR:comment": column_named(f.name).label}) for f in table.schema]
     if part.start is not None:
         ticks = clock_times(part.time, part.start).astype("datetime64[ms]").view(np.int64)
         clock = pa.Array.from_buffers(pa.int64(), len(ticks), [None, pa.py_buffer(ticks)])

@@ -10,8 +10,8 @@ from typing import IO, Any, Self
 from terragrip.files import unwritable
 
 
-class Aside:
-    """A pile in a temporary file without a name, which only this process can open and which ends with it.
+class StackOnDisk:
+    """A stack in a temporary file without a name, which only this process can open and which ends with it.
 
     ``beside``: the folder on whose disk it is, where the results go too; None: the system's.
     """
@@ -27,8 +27,8 @@ class Aside:
     def __len__(self) -> int:
         return len(self._places)
 
-    def put(self, block: Any) -> None:
-        """Put a block on the pile; raises InputError if it cannot be written."""
+    def push(self, block: Any) -> None:
+        """Put a block on top; raises InputError if it cannot be written."""
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile(dir=self._beside)  # noqa: SIM115 - `__exit__` closes it
@@ -39,8 +39,8 @@ class Aside:
             where = self._beside or tempfile.gettempdir()
             raise unwritable(where, error, "free space or choose another folder") from error
 
-    def finish(self) -> Any:
-        """Take the block that was put last off the pile; raises IndexError where there is none."""
+    def pop(self) -> Any:
+        """Remove the block on top and return it; raises IndexError where there is none."""
         place = self._places.pop()
         assert self._file is not None
         self._file.seek(place)
