@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-Floats = npt.NDArray[np.float64]
 
 _ENOUGH = 4000  # rows that show how far rows are apart
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less

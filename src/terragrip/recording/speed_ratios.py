@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import RATIOS
 from terragrip.recording.turns import filled, straight_rows
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 # Ratio of wheel speed times radius to ground speed, and its cause; slip raises it by 1/(1 - slip).
 _RATIOS = (

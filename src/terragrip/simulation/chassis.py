@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Floats
 from terragrip.simulation.fields import Field
 from terragrip.simulation.route import Path
 from terragrip.simulation.scenario import Scenario
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
-
-Floats = npt.NDArray[np.float64]
 
 LEAST_LOAD = -0.9  # relative: a wheel that a hill all but lifts
 
