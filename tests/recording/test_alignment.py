@@ -126,7 +126,7 @@ def test_a_log_says_what_its_ground_speed_may_be_late_by() -> None:
     def delay(seconds: float) -> float:
         columns = {"ground_speed": np.interp(time - seconds, time, speed), "wheel_speed_l": 5 * speed}
         columns["wheel_speed_l"] += 0.01 * np.sin(7 * time)
-        return survey_of(LogBlocks.of(Recording.from_frame({"time": time, **columns}), 700)).delay
+        return survey_of(LogBlocks.of(Recording.from_frame({"time": time, **columns}), 700)).sample.delay
 
     explained = 1.7 / (2 * 9.80665)  # of which any part may be the vehicle's own
     assert delay(0.0) == pytest.approx(explained / np.sqrt(3), rel=0.3)
@@ -151,9 +151,9 @@ def test_a_lag_is_searched_once_and_again_where_it_was_set_right(
         monkeypatch.setattr(module, "lag_within", counted)
     (moved,) = aligned([log])
     assert any("it was shifted by" in note for note in moved.notes) == (seconds > 0)
-    known = survey_of(LogBlocks.of(moved, 700)).delay
+    known = survey_of(LogBlocks.of(moved, 700)).sample.delay
     assert len(tried) == searches
-    assert known == delay_of(tried[-1]) == survey_of(LogBlocks.of(replace(moved, delay=None))).delay
+    assert known == delay_of(tried[-1]) == survey_of(LogBlocks.of(replace(moved, delay=None))).sample.delay
     assert moved.with_channels(ground_speed=speed).delay is None
 
 

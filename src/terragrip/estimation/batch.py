@@ -14,7 +14,6 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.forward import carried_channels, flag_before_gaps, run
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.estimation.noise import DELAY
 from terragrip.estimation.provenance import notes_of
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
@@ -125,15 +124,11 @@ def estimated(
     # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     turn, turn_notes = turn_in(log, known.sample, vehicle)
-    sensors = dict(options.sensors or {})
-    # By consecutive rows, which a sample of them does not hold.
-    if vehicle.sensors.ground_speed_delay is None:
-        sensors = {DELAY: known.delay} | sensors
     estimator = TractionEstimator.for_recording(
         known.sample,
         vehicle,
         options.method,
-        sensors=sensors,
+        sensors=options.sensors,
         held=options.held,
         gap=options.gap,
         standstill_speed=options.standstill_speed,

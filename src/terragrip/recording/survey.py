@@ -49,15 +49,13 @@ class LogBlocks:
 class Survey:
     """The result of one pass over a log: the number of its ``rows``, and a ``sample`` of them spread over the whole log.
 
-    ``sample`` has the channels with a value anywhere in the log, and all remarks of its reader (notes, noise).
-    ``empty``: the channels without any value; ``delay``: SD [s] of what the ground speed is late by, as its first rows tell; 0: they
-    tell nothing.
+    ``sample`` has the channels with a value anywhere in the log, all remarks of its reader (notes, noise), and the ``delay`` that the
+    log's first rows, which are consecutive, show. ``empty``: the channels without any value.
     """
 
     rows: int
     sample: Recording
     empty: tuple[str, ...]
-    delay: float = 0.0
 
     def without_empty(self, block: Recording) -> Recording:
         """A block of the log without the channels that have no value anywhere."""
@@ -100,10 +98,9 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
         sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} has no value and is left out." for name in empty]
-    delay = last.delay
-    result = Survey(
-        rows, sample, empty, delay_of(lag_within(*first_speeds(beginning))) if delay is None else delay
-    )
+    if sample.delay is None:
+        sample = replace(sample, delay=delay_of(lag_within(*first_speeds(beginning))))
+    result = Survey(rows, sample, empty)
     return replace(result, sample=result.without_empty(sample).with_notes(*notes))
 
 
