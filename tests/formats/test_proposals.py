@@ -474,9 +474,13 @@ def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) 
         ("Air mass flow", None),
         ("Weight front axle", None),
         ("Payload mass", None),
+        ("pull [kg]", "drawbar_force"),
+        ("Wheel torque FL [lb ft]", "drive_torque_fl"),
+        ("spindle [deg/s]", "angular_velocity_z"),
+        ("spindle [rpm]", None),  # shafts are counted so, a vehicle's turning is not
     ],
 )
-def test_masses_and_hitch_forces_by_their_names(column, channel):
+def test_masses_hitch_forces_torques_and_turns_by_their_names_and_units(column, channel):
     from terragrip.formats.candidates import candidates_of, columns_of
     from terragrip.formats.vocabulary import GENERAL
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.axles import _pulls
+from terragrip.recording.mechanics import Means
 from terragrip.simulation import families
 from terragrip.vehicle import Vehicle
 
@@ -143,3 +145,17 @@ def test_axles_that_slip_unlike_are_held_against_one_rising_curve(
 def test_at_unlike_slips_a_straight_and_a_flat_curve_are_right_too(curve: Curve) -> None:
     columns, vehicle = unlike_slips(curve)
     assert said(Recording.from_frame(columns), vehicle) == []
+
+
+@pytest.mark.parametrize("climb", [None, 0.5])
+def test_an_unmeasured_pull_is_at_most_what_motion_and_slope_leave_of_the_thrust(
+    vehicle: Vehicle, columns: dict[str, np.ndarray], climb: float | None
+) -> None:
+    """Newton's second law, of 139 kg; [m/s²]."""
+    rows = np.ones(50, dtype=bool)
+    slope = None if climb is None else np.full(50, climb)
+    means = Means(np.arange(50), 50, rows, np.full(50, 0.1), np.ones(50), slope)
+    log = Recording.from_frame({n: v for n, v in columns.items() if n != "drawbar_force"})
+    none, most = _pulls(log, vehicle, means, np.full(50, 300.0))
+    assert not none.any()
+    assert most == pytest.approx(300.0 - 139 * (0.1 + (climb or 0.0)))

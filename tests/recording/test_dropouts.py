@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from steady_drive import TIME, log, pulling
+from terragrip.recording import Recording
 from terragrip.recording.dropouts import dropout_warnings
 
 
@@ -80,3 +81,33 @@ def test_a_speed_that_creeps_is_rounded_to_0_by_chance() -> None:
     """A vehicle that is stuck while its wheels turn."""
     creeps = np.round(0.02 + 0.01 * np.random.default_rng(1).standard_normal(len(TIME)), 2)
     assert dropout_warnings(log(ground_speed=creeps)) == []
+
+
+def test_logs_without_a_ground_speed_or_wheels_say_nothing() -> None:
+    channels = log().channels
+    rims = {n: v for n, v in channels.items() if n != "ground_speed"}
+    for kept in (rims, {"ground_speed": np.where(TIME % 5 == 3, 0.0, channels["ground_speed"])}):
+        assert dropout_warnings(Recording(TIME, kept)) == []
+
+
+def test_wheels_that_read_0_below_their_least_speed_are_not_locked() -> None:
+    """Ten seconds of creeping after a stop, at .1 m/s where others drive at 2: a sensor of pulses reads 0."""
+    drive = log().channels
+    creeps = (TIME >= 100) & (TIME <= 110)
+    ground = np.where(creeps, 0.1, drive["ground_speed"])
+    still = {n: np.where(creeps, 0.0, drive[n]) for n in ("wheel_speed_l", "wheel_speed_r")}
+    assert dropout_warnings(log(ground_speed=ground, **still)) == []
+
+
+def test_a_wheel_of_few_pulses_reads_0_between_them_without_an_error() -> None:
+    """It creeps for twenty seconds: every other sample has a pulse."""
+    drive = log().channels
+    creeps = (TIME >= 95) & (TIME <= 115)
+    ground = np.where(creeps, 0.1, drive["ground_speed"])
+    pulses = np.where(creeps, 0.5 * (np.arange(len(TIME)) % 2), drive["wheel_speed_l"])
+    assert dropout_warnings(log(ground_speed=ground, wheel_speed_l=pulses)) == []
+
+
+def test_a_receiver_that_never_reads_anything_but_0_is_named_once() -> None:
+    """By `frozen_warnings`, which say that it never changes."""
+    assert dropout_warnings(log(ground_speed=0.0)) == []

@@ -132,3 +132,12 @@ def test_a_load_cell_at_its_limit_torques_that_freeze_together_and_an_accelerome
     acceleration = np.where(rows, drive["acceleration_x"][rows][0], drive["acceleration_x"])
     (note,) = frozen_warnings(pulling(acceleration_x=acceleration))
     assert note.startswith("acceleration_x repeats")
+
+
+def test_wheels_that_hardly_ever_leave_0_do_not_change_while_a_speed_is_repeated() -> None:
+    """The last digit of two dead sensors flickers."""
+    rows = (TIME >= 20) & (TIME <= 30)
+    flicker = np.where(rows & (np.arange(len(TIME)) % 3 == 0), 0.001, 0.0)
+    ground = np.where(rows, 1.5, log().channels["ground_speed"])
+    dead = log(ground_speed=ground, wheel_speed_l=flicker, wheel_speed_r=flicker)
+    assert frozen_warnings(dead) == []

@@ -110,3 +110,13 @@ def test_a_late_clock_is_off_in_gains_and_losses_of_speed_alike(late: float) -> 
     assert lag is not None
     assert lag.is_to_correct
     assert lag.seconds == pytest.approx(late, abs=0.1)
+
+
+@pytest.mark.parametrize("late", [-1.0, 1.5])
+def test_of_a_log_that_ends_at_speed_the_gains_alone_tell_a_late_clock(late: float) -> None:
+    """Its losses of speed are noise, which contradicts nothing."""
+    part = TIME < 28
+    lag = lag_within(TIME[part], {n: x[part] for n, x in stopped_log(late, 0.0).items()})
+    assert lag is not None
+    assert lag.is_to_correct
+    assert lag.seconds == pytest.approx(late, abs=0.1)

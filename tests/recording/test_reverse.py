@@ -7,6 +7,7 @@ import pytest
 
 import terragrip as tg
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.reverse import reverse_warnings
 
 TRACK, RADIUS = 0.8, 0.3
 TIME = np.arange(0, 300, 0.1)
@@ -145,3 +146,35 @@ def test_wheels_against_a_receiver_that_measures_in_rows_of_its_own_are_named() 
     columns["ground_speed"] = np.where(own, columns["ground_speed"], np.nan)
     columns |= {wheel: np.where(own, np.nan, -columns[wheel]) for wheel in WHEELS}
     assert "Against the direction of travel" in said(columns)
+
+
+def test_a_machine_of_a_fifth_of_a_metre_a_second_is_judged_as_a_fast_one() -> None:
+    slow = unsigned({n: v if n == "time" else 0.15 * v for n, v in drive().items()}, "ground_speed")
+    (note,) = reverse_warnings(Recording.from_frame(slow), machine())
+    assert note.startswith("ground_speed has no sign")
+
+
+def test_one_axle_that_is_measured_tells_of_speeds_without_a_sign() -> None:
+    both = unsigned(unsigned(drive(), "ground_speed"), "wheel_speed")
+    rear = {n: v for n, v in both.items() if n not in ("wheel_speed_fl", "wheel_speed_fr", "wheel_speed_rl")}
+    assert said(rear) == ""
+    assert "contradicts the wheels' speeds" in said({**rear, "wheel_speed_rl": both["wheel_speed_rl"]})
+
+
+def test_a_machine_that_never_moves_says_nothing() -> None:
+    still = {n: v if n == "time" else np.zeros(len(TIME)) for n, v in drive().items()}
+    assert reverse_warnings(Recording.from_frame(still), machine()) == []
+
+
+def test_wheels_without_a_sign_beside_a_ground_speed_with_one_are_named() -> None:
+    """It goes back for four seconds at a time, in turns."""
+    columns = drive()
+    draws, back = np.random.default_rng(5), TIME % 16 > 12
+    speed, turn = np.where(back, -1.0, 1.0), 0.4 * np.sin(TIME / 7)
+    columns["ground_speed"] = speed + 0.01 * draws.standard_normal(len(TIME))
+    columns["angular_velocity_z"] = turn + 0.01 * draws.standard_normal(len(TIME))
+    for wheel in WHEELS:
+        hub = speed + (-1 if wheel.endswith("l") else 1) * TRACK / 2 * turn
+        columns[wheel] = np.abs(hub) / 0.95 / RADIUS
+    (note,) = reverse_warnings(Recording.from_frame(columns), machine())
+    assert "of the turns angular_velocity_z contradicts the wheels' speeds" in note

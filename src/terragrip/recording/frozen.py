@@ -112,7 +112,7 @@ def _repeats(
     lasting = when[last] - when[first]
     usual = median(np.diff(when[first])) if len(first) > 2 else np.inf
     step, size = quantum(what), quantile(np.abs(what), 0.95)
-    if step > _COARSE * size and _by_steps(what, step):
+    if step > _COARSE * size > 0.0 and _by_steps(what, step):
         return (
             []
             if forces

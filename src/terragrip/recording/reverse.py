@@ -70,7 +70,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             f"ground_speed is negative from {slides[0]:.4g} to {slides[1]:.4g} s while the wheels turn forward: its sign is wrong there, "
             "unless the vehicle slid backward."
         ]
-    if not moving.any() or np.mean(speed[moving] < 0) > 1 - _ALIKE:
+    if not moving.any():
         return []
     if np.mean(back[moving]) >= _SHARE:
         ahead = moving & (rim > 0)
