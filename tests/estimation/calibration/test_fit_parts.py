@@ -332,6 +332,28 @@ def test_constant_errors_of_channels_shift_loads_and_so_gains(vehicle: Vehicle) 
     np.testing.assert_allclose(covariance, sum(np.outer(e, e) for e in effects))
 
 
+def test_an_unmeasured_pull_is_what_the_wheels_do_beside_accelerating(vehicle: Vehicle) -> None:
+    """Four torques of 10 N m on wheels of .2 m push 200 N."""
+    four = np.arange(4)
+    assert gains._unseen_pull(table(), vehicle, four) == pytest.approx(200.0)
+    assert gains._unseen_pull(table(push=np.full(N, 0.1)), vehicle, four) == pytest.approx(
+        200.0 - 0.1 * vehicle.mass
+    )
+    assert gains._unseen_pull(table(push=np.full(N, np.nan)), vehicle, four[2:]) == pytest.approx(100.0)
+    assert gains._unseen_pull(table(torque=np.full((N, 4), -10.0)), vehicle, four) == 0.0
+
+
+@pytest.mark.parametrize(("axle_load", "said"), [(0.0, False), (0.01, True)])
+def test_intervals_speak_of_axle_loads_where_these_may_be_off(
+    vehicle: Vehicle, axle_load: float, said: bool
+) -> None:
+    fit = SharedGains(np.zeros(4), np.zeros(4), 1e-4 * np.eye(8), N, 10, np.zeros((8, 4)))
+    found = gains._quantities(fit, fit.covariance, fit.covariance, vehicle, np.arange(4), (), 0.0, axle_load)
+    assert [(one.value, one.std) for one in found] == [(1.0, pytest.approx(0.01))] * 4
+    assert all(("the intervals hold axle loads that are 1 % off" in one.sentence) is said for one in found)
+    assert all(("axle loads" in one.sentence) is said for one in found)
+
+
 def test_errors_that_outlast_a_block_are_in_the_standard_error() -> None:
     """The mean of 40 blocks whose errors last for four of them: blocks taken alone say half the error."""
     scores = []

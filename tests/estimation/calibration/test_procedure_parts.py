@@ -71,6 +71,10 @@ def test_what_is_left_unknown_of_each_constant(vehicle: Vehicle) -> None:
         "drive_torque_gain": pytest.approx(0.003),
         "drive_torque_gain_common": pytest.approx(np.hypot(0.01, 0.01)),
     }
+    alone = procedure._left(
+        of_gains, stating(vehicle, drive_torque_gain=0.02)
+    )  # nothing else is common to all
+    assert alone["drive_torque_gain_common"] == pytest.approx(0.01)
     assert procedure._left(of_gains, stating(vehicle)) == {}
 
 

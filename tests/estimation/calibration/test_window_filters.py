@@ -317,3 +317,8 @@ def test_a_bar_that_moves_no_more_than_its_noise_is_free(scatter: float, free: b
     assert zeros._free_passes(stopped((15, 25), drawbar=bar, drawbar_count=np.full(40, 100.0)), 5.0) == []
     slow = replace(windows, ground_speed=np.full(40, 0.09))
     assert zeros._free_passes(slow, 5.0) == []
+
+
+def test_windows_of_a_single_sample_count_where_all_are_such(vehicle: Vehicle) -> None:
+    """A log of 2 Hz."""
+    assert driving(table(count=np.ones(N)), vehicle).all()
