@@ -127,6 +127,16 @@ def test_slips_that_a_drive_of_five_seconds_has_not_shown_are_in_the_interval(im
     assert held(estimates, made, rows, "slip_fl") > 0.9
 
 
+def test_slip_grows_with_the_pull_along_the_curves_tangent() -> None:
+    """From .10 on it pulls by .083 of the load more, without a ground speed: by the slope there, .4 at most, slip is .133."""
+    made = drive(66.0, rate=20.0, noise=0.3, slip=lambda t: 0.1 + 0.06 * np.clip((t - 60.5) / 0.5, 0, 1))
+    estimates, rows = lost(made, LOST, 66.0)
+    late = rows & (made.recording.time > 61.5) & (made.recording.time < 64)
+    pulls = made.truth["adhesion_fl"]
+    expected = 0.1 + 0.4 * (pulls[-1] - pulls[0])
+    assert np.mean(estimates["slip_fl"][late]) == pytest.approx(expected, abs=0.003)
+
+
 def test_the_usual_slip_is_learned_from_a_slow_receiver_as_well() -> None:
     """Of one second a value; rows of the wheels come twenty times as often."""
     made = drive(100.0, rate=20.0, slip=lambda t: 0.25 + 0 * t)
