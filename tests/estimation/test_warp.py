@@ -81,9 +81,10 @@ def test_the_thrust_of_all_wheels_stays() -> None:
     assert np.std(thrust(with_bumps) - thrust(without)) < 0.05 * np.mean(thrust(without))
 
 
-def slipping(plain: Drive, gap: float = 0.0) -> Drive:
-    """The drive with one diagonal's wheels now faster, now slower, and without any value for ``gap`` s of every 5 s."""
-    by = 0.03 * np.sin(2 * np.pi * 0.6 * plain.recording.time / (8 * RADIUS))
+def slipping(plain: Drive, gap: float = 0.0, share: float = 0.03, radii: float = 8.0) -> Drive:
+    """The drive with one diagonal's wheels now a ``share`` faster, now slower, once on so many ``radii`` of way, and without any value for
+    ``gap`` s of every 5 s."""
+    by = share * np.sin(2 * np.pi * 0.6 * plain.recording.time / (radii * RADIUS))
     channels = dict(plain.recording.channels)
     for wheel, sign in zip(WHEELS, LAYOUT["diagonal"], strict=True):
         channels[f"wheel_speed_{wheel}"] = channels[f"wheel_speed_{wheel}"] * (1 + sign * by)
@@ -105,6 +106,13 @@ def test_a_diagonal_that_slips_more_is_higher_on_the_curve() -> None:
     pattern, slips, secant = told(slipping(drive(30.0)))
     assert np.corrcoef(pattern, slips)[0, 1] > 0.7
     assert 0.2 * secant < np.std(pattern) / np.std(slips) < 0.7 * secant
+
+
+def test_slips_that_differ_by_half_of_what_they_are_tell_of_the_load_as_small_differences_do() -> None:
+    """Wheels that slip by .1 and .3 in place of .2, on 32 radii of way, do not spin: half of the secant, as of small ones."""
+    made = slipping(drive(30.0, slip=lambda t: 0.2 + 0 * t), share=0.12, radii=32)
+    pattern, slips, secant = told(made)
+    assert 0.45 * secant < np.std(pattern) / np.std(slips) < 0.6 * secant
 
 
 def test_what_slips_tell_is_no_later_than_their_mean_over_a_quarter_of_a_radius() -> None:
