@@ -32,9 +32,9 @@ NEEDS = [
 class Served:
     """A studio on a folder, served by a thread; it can be stopped and started again on its port."""
 
-    def __init__(self, folder: Path, live: str | None = None) -> None:
-        self.folder, self.live = folder, live
-        self.port = 0  # the first start chooses one
+    def __init__(self, folder: Path, port: int) -> None:
+        self.folder, self.port = folder, port
+        self.live: str | None = None
         self.start()
 
     @property
@@ -44,10 +44,8 @@ class Served:
     def start(self) -> None:
         app = create_app(self.folder, upload_limit=20_000_000, live=self.live)
         config = uvicorn.Config(app, log_level="critical", timeout_graceful_shutdown=1)
-        listener = config_socket(self.port)
-        self.port = listener.getsockname()[1]
         self.server = uvicorn.Server(config)
-        self.thread = threading.Thread(target=self.server.run, args=([listener],), daemon=True)
+        self.thread = threading.Thread(target=self.server.run, args=([bound(self.port)],), daemon=True)
         self.thread.start()
         until(lambda: self.server.started)
 
@@ -57,8 +55,8 @@ class Served:
         assert not self.thread.is_alive()
 
 
-def config_socket(port: int) -> socket.socket:
-    """A socket that listens on a port of this machine, 0 for any that is free: nobody else can have it in between."""
+def bound(port: int) -> socket.socket:
+    """A socket on a port of this machine, 0 for any that is free; until one of them listens, there may be several on a port."""
     listener = socket.socket()
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     listener.bind(("127.0.0.1", port))

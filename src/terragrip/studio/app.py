@@ -6,11 +6,12 @@ import contextlib
 import os
 import threading
 from collections.abc import AsyncIterator, Iterable
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
@@ -72,11 +73,15 @@ def create_app(
         await studio.jobs.close()
 
     # Swagger's own page loads from the internet; the description alone is at /openapi.json.
-    app = FastAPI(title="Terragrip studio", version=__version__, docs_url=None, redoc_url=None, lifespan=life)
+    app = FastAPI(
+        title="Terragrip studio",
+        version=__version__,
+        docs_url=None,
+        redoc_url=None,
+        lifespan=life,
+        routes=list(_interface().routes),
+    )
     app.state.studio = studio
-    for name in ROUTES:
-        app.include_router(import_module(f"terragrip.studio.api.{name}").router, prefix="/api")
-    app.include_router(import_module("terragrip.studio.api.monitoring").router)
     app.add_exception_handler(InputError, _unusable)
     app.add_exception_handler(RequestValidationError, _malformed)
     if (STATIC / "index.html").is_file():
@@ -85,6 +90,16 @@ def create_app(
         app.add_api_route("/", _not_built, include_in_schema=False)
     app.add_middleware(Access, hosts=tuple(hosts), token=token, public=public)
     return app
+
+
+@cache
+def _interface() -> APIRouter:
+    """All routes but the pages. An application that includes routers itself reads their functions' signatures anew at its first request."""
+    router = APIRouter()
+    for name in ROUTES:
+        router.include_router(import_module(f"terragrip.studio.api.{name}").router, prefix="/api")
+    router.include_router(import_module("terragrip.studio.api.monitoring").router)
+    return router
 
 
 class _Pages(StaticFiles):
