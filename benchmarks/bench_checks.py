@@ -2,7 +2,7 @@
 
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
-The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, torque_signs.py, rolling.py,
+The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, torque_signs.py, rolling.py,
 turn_rates.py, forces.py, and torques.py's least thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in
 turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes
 are put into every third of the drives (torques without a sign into all logs that have negative ones); one is found where its own note
@@ -42,6 +42,7 @@ LIMITS = {
     "frozen": "_TIMES _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
+    "replays": "_CHANNELS _CHANGES",
     "torques": "_LEAST",
     "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
@@ -140,6 +141,14 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
     yield "speed held 8 s", "repeats", changed(log, "ground_speed", by=held), vehicle
     yield "torque held 8 s", "repeats", changed(log, torques[0], by=held), vehicle
     yield "hung 8 s", "the logger hung", changed(log, "", by=held), vehicle
+    early = np.searchsorted(time, time[row] - 8.0)
+    second = np.arange(early, early + late.sum())
+    yield (
+        "8 s written twice",
+        "wrote a buffer twice",
+        changed(log, "", by=lambda v: np.concatenate([v[:row], v[second], v[row + len(second) :]])),
+        vehicle,
+    )
     yield (
         "torque 0 for 8 s",
         "while all other torques",
