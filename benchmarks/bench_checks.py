@@ -39,7 +39,7 @@ RATES = (None, 100.0, 20.0, 10.0)
 LIMITS = {
     "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
     "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
-    "frozen": "_TIMES _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
+    "frozen": "_TIMES _FINE _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
     "replays": "_CHANNELS _CHANGES",
@@ -141,6 +141,12 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
     yield "speed held 8 s", "repeats", changed(log, "ground_speed", by=held), vehicle
     yield "torque held 8 s", "repeats", changed(log, torques[0], by=held), vehicle
     yield "hung 8 s", "the logger hung", changed(log, "", by=held), vehicle
+    yield (
+        "all speeds held 8 s",
+        "All speeds keep",
+        changed(log, "ground_speed", "wheel_", by=held),
+        vehicle,
+    )
     early = np.searchsorted(time, time[row] - 8.0)
     second = np.arange(early, early + late.sum())
     yield (

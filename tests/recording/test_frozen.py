@@ -73,6 +73,23 @@ def test_a_logger_that_hung_is_named_and_a_gap_is_no_repetition() -> None:
     assert frozen_warnings(two.with_channels(wheel_speed_l=speed)) == []
 
 
+@pytest.mark.parametrize("every", [1, 3])
+def test_speeds_that_freeze_together_while_forces_go_on_are_named(every: int) -> None:
+    """A bus that fell silent, and a logger that repeats what it had: slip and resistance were those of an earlier instant."""
+    rows = (TIME >= 20) & (TIME <= 40)
+    here = np.arange(len(TIME)) % every == 0
+    drive = {n: np.where(here, v, np.nan) if "speed" in n else v for n, v in pulling().channels.items()}
+    frozen = {n: np.where(rows & here, v[here & rows][0], v) if "speed" in n else v for n, v in drive.items()}
+    assert frozen_warnings(pulling(**drive)) == []
+    notes = [n for n in frozen_warnings(pulling(**frozen)) if n.startswith("All speeds keep their values")]
+    assert len(notes) == 1
+    assert "while other channels go on" in notes[0]
+    gone = {n: np.where(rows, np.nan, v) if "speed" in n else v for n, v in drive.items()}
+    assert frozen_warnings(pulling(**gone)) == [], "empty cells"
+    cruise = {n: np.round(v, 1) if "speed" in n else v for n, v in frozen.items()}
+    assert frozen_warnings(pulling(**cruise)) == [], "a cruise by coarse speeds"
+
+
 def test_a_ground_speed_in_coarse_steps_is_named() -> None:
     """Of 2 km/h."""
     coarse = np.round(3.6 * log().channels["ground_speed"] / 2) * 2 / 3.6
@@ -111,7 +128,8 @@ def test_a_spoiled_value_is_no_step_of_a_channel() -> None:
 def test_a_spoiled_value_is_no_change_of_another_speed() -> None:
     """The wheels go on at one speed while the ground speed repeats a value: so may a vehicle."""
     rows = (TIME >= 20) & (TIME <= 40)
-    columns = {n: np.where(rows, v[rows][0], v) for n, v in log().channels.items() if "wheel" in n}
+    noise = np.round(0.01 * np.random.default_rng(7).standard_normal(len(TIME)), 3)
+    columns = {n: np.where(rows, v[rows][0] + noise, v) for n, v in log().channels.items() if "wheel" in n}
     columns["ground_speed"] = np.where(rows, 1.5, log().channels["ground_speed"])
     steady = log(**columns)
     assert frozen_warnings(steady) == []

@@ -11,6 +11,7 @@ from terragrip.recording.held import known_part, quantum, usual_values
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
+from terragrip.recording.turns import filled
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -19,6 +20,8 @@ _TIMES = 20.0  # ... and of its usual repetition
 _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: what they change meanwhile
 _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _SEVERAL = 4  # channels
+_MEASURED = 4  # values that are the same
+_FINE = 0.02  # of a speed: smaller steps show its noise
 _CHANGES = 20  # of a channel's value: fewer show no resolution
 _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
 
@@ -58,7 +61,7 @@ def frozen_warnings(recording: Recording) -> list[str]:
         notes += _repeats(name, recording.time, values, others, forces=True)
     if acceleration is not None:
         notes += _repeats("acceleration_x", recording.time, acceleration, _metric(speeds))
-    return notes + _hung(recording)
+    return notes + _together(recording, speeds)
 
 
 def _by_steps(what: Floats, step: float) -> bool:
@@ -68,26 +71,52 @@ def _by_steps(what: Floats, step: float) -> bool:
     return len(changes) > _CHANGES and float(np.mean(changes < 1.5 * step)) > 0.5
 
 
-def _hung(recording: Recording) -> list[str]:
-    """A sentence where all channels keep their values for long while the vehicle drives."""
-    ground = recording.channels.get("ground_speed", np.full(len(recording), np.nan))
-    if len(recording) < 3 or not np.isfinite(ground).all() or not may_last(recording.time, ground):
+def _together(recording: Recording, speeds: dict[str, Floats]) -> list[str]:
+    """A sentence where all channels, or all speeds while others go on, keep their values for long while the vehicle drives."""
+    if "ground_speed" not in speeds or len(recording) < 3:
         return []
-    channels = [v for v in recording.channels.values() if not is_one_value(v) and np.isfinite(v).all()]
-    if len(channels) < _SEVERAL:
+    changing = {n: v for n, v in recording.channels.items() if not is_one_value(v) and np.isfinite(v).any()}
+    if len(changing) >= _SEVERAL and (stretch := _kept(recording, changing)):
+        return [
+            f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
+        ]
+    moved = {n: v for n, v in speeds.items() if n in changing}
+    if len(moved) < 2 or "ground_speed" not in moved or not (stretch := _kept(recording, moved)):
         return []
-    time, same = recording.time[1:], np.abs(ground[1:]) > DRIVING * quantile(np.abs(ground), 0.95)
-    for values in channels:
-        if not same.any():
-            return []
-        same &= values[1:] == values[:-1]
-    stretch = longest(time, same, np.ones(len(same), dtype=bool))
-    changes = time[ground[1:] != ground[:-1]]
-    if stretch is None or len(changes) < 3 or stretch[1] - stretch[0] < _TIMES * median(np.diff(changes)):
+    if any(_step_of(v) > _FINE for v in moved.values()):  # a cruise may stay within a step
         return []
     return [
-        f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
+        f"All speeds keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s while other channels go on: not measured, it seems. "
+        "Leave these cells empty: the intervals then show how little is known."
     ]
+
+
+def _step_of(values: Floats) -> float:
+    """The distance of a channel's values, of its size."""
+    known = values[np.isfinite(values)]
+    return quantum(known) / max(quantile(np.abs(known), 0.95), 1e-9)
+
+
+def _kept(recording: Recording, channels: dict[str, Floats]) -> tuple[float, float] | None:
+    """The longest stretch of driving in which all of some ``channels``, the ground speed among them, repeat their values."""
+    time, ground = recording.time, channels["ground_speed"]
+    if not may_last(*known_part(time, ground)):
+        return None
+    same = np.abs(filled(time, ground)[1:]) > DRIVING * quantile(np.abs(ground[np.isfinite(ground)]), 0.95)
+    usual = 0.0
+    for values in channels.values():
+        whole = filled(time, values)
+        alike = whole[1:] == whole[:-1]
+        same &= alike
+        if not same.any():
+            return None
+        usual = max(usual, median(np.diff(time[1:][~alike])) if np.sum(~alike) > 2 else np.inf)
+    stretch = longest(time[1:], same, np.ones(len(same), dtype=bool))
+    if stretch is None or stretch[1] - stretch[0] < _TIMES * usual:
+        return None
+    inside = (time >= stretch[0]) & (time <= stretch[1])
+    measured = all(np.isfinite(values[inside]).sum() >= _MEASURED for values in channels.values())
+    return stretch if measured else None
 
 
 def _metric(speeds: dict[str, Floats]) -> list[Floats]:

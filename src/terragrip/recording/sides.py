@@ -25,6 +25,7 @@ _LEAST = 15  # windows of 2 s
 _DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
 _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
+_APART = 0.1  # the same, where only other axles show that it is straight: the furrow wheel of a plough slips .1 less
 _PULLING = 0.1  # of an axle's load: torques that are compared
 _UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 % off, two of them 7
 _STEADY = 0.15  # quartiles of such a logarithm
@@ -39,16 +40,19 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
     """Sentences on wheels of a wrong radius, and on torques of a wrong sign or scale. ``turn`` (n,) [rad/s], left positive: by a
     sensor.
 
-    Without one the vehicle drives straight ahead where all its rims agree; differences between them are then not checked.
+    Without one the vehicle drives straight ahead where the rims of all axles agree; a difference on a single axle is then checked where the
+    others agree.
     """
     drive = _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
     if drive is None:
         return [], []
     straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
     if turn is None:
-        apart = np.max([np.abs(np.diff(axle.rims, axis=0)[0]) for axle in drive.axles], axis=0)
-        straight &= apart < _STRAIGHT * drive.pace
-    rolling = [] if turn is None else [note for axle in drive.axles for note in _rolling(axle, straight)]
+        level = [np.abs(np.diff(axle.rims, axis=0)[0]) < _STRAIGHT * drive.pace for axle in drive.axles]
+        rolling = _rolling_apart(drive.axles, straight, level)
+        straight &= np.all(level, axis=0)
+    else:
+        rolling = [note for axle in drive.axles for note in _rolling(axle, straight, _ROLL)]
     opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
     return rolling, [] if rolling else opposed or _uneven(drive.axles, straight)
 
@@ -149,13 +153,24 @@ def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_
     return axles, means[0]
 
 
-def _rolling(axle: _Axle, straight: Bools) -> list[str]:
-    """Rims with different speeds straight ahead."""
+def _rolling_apart(axles: tuple[_Axle, ...], driving: Bools, level: list[Bools]) -> list[str]:
+    """Rims of one axle with different speeds where all others' are alike (``level``), where nothing else shows the turn."""
+    if len(axles) < 2:
+        return []
+    notes = []
+    for k, axle in enumerate(axles):
+        others = np.all([rows for j, rows in enumerate(level) if j != k], axis=0)
+        notes += _rolling(axle, driving & others, _APART)
+    return notes if len(notes) == 1 else []
+
+
+def _rolling(axle: _Axle, straight: Bools, least: float) -> list[str]:
+    """Rims with speeds straight ahead that differ by the logarithm ``least`` or more."""
     left, right = axle.rims[:, straight]
     if straight.sum() < _LEAST or (right == 0).any():
         return []
     low, ratio, high = np.quantile(left / right, [0.25, 0.5, 0.75])
-    if abs(np.log(max(ratio, 1e-9))) < _ROLL or low < 1 < high:
+    if abs(np.log(max(ratio, 1e-9))) < least or low < 1 < high:
         return []
     if (
         low <= 0 or np.log(high / low) > _STEADY
