@@ -2,11 +2,12 @@
 
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
-The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, torque_signs.py, rolling.py,
-turn_rates.py, forces.py, and torques.py's least thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in
-turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes
-are put into every third of the drives (torques without a sign into all logs that have negative ones); one is found where its own note
-comes.
+The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py,
+torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, and torques.py's least
+thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
+the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques
+without a sign into all logs that have negative ones); one is found where its own note comes.
+
 --write puts the table into docs/formats.md.
 """
 
@@ -47,11 +48,16 @@ LIMITS = {
     "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
+    "pitch": "_LONG _MOVED _BEYOND _STAYS",
+    "sides": "_APART",
     "rolling": "_PULLING _MOST",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
 SHARES = {("pace", "_OFTEN"), ("rolling", "_MOST"), ("turn_rates", "_ALIKE")}
 """Of which the distance to 1 is halved and doubled."""
+
+TURNS = ("angular_velocity_z", "latitude", "longitude")
+"""Channels that show them."""
 
 UNSIGNED = "have no sign"
 """Words of the note on it."""
@@ -184,6 +190,16 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
     yield "torque over 25", "drive torques over", changed(log, "drive_torque", by=lambda v: v / 25), vehicle
     mean = np.nanmean([log.channels[n] for n in torques], axis=0)
     yield "one torque for all", "are one signal", log.with_channels(**dict.fromkeys(torques, mean)), vehicle
+    if {"acceleration_x", "pitch"} <= log.channels.keys():
+        yield (
+            "accelerometer's zero moved .3",
+            "zero of one of the two moved",
+            changed(log, "acceleration_x", by=lambda v: np.where(time > middle, v + 0.3, v)),
+            vehicle,
+        )
+    first = f"wheel_speed_{vehicle.wheels[0]}"
+    blind = replace(log, channels={n: v for n, v in log.channels.items() if not n.startswith(TURNS)})
+    yield "one rim 1.2 times", "Straight ahead the rim", changed(blind, first, by=lambda v: 1.2 * v), vehicle
     if "acceleration_x" in log.channels:
         yield (
             "accelerometer in g",

@@ -66,3 +66,18 @@ def test_a_pitch_that_is_late_or_early_is_named(case: Case, seconds: float) -> N
     late[known] = np.interp(log.time[known] - seconds, log.time[known], log.channels["pitch"][known])
     (note,) = said(log, late)
     assert note.startswith(f"pitch is about {abs(seconds)} s " + ("behind" if seconds > 0 else "ahead of"))
+
+
+@pytest.mark.parametrize("case", MACHINES[1:])
+@pytest.mark.parametrize("name", ["acceleration_x", "pitch"])
+def test_a_zero_that_moves_in_the_drive_is_named_with_the_instant(case: Case, name: str) -> None:
+    """A mount that slips by 3 degrees: soil resistance was .05 off from there on, without a word."""
+    log, share = drive(*case), np.sin(np.radians(3))
+    moved = log.channels[name] + np.where(log.time > 80, share * (9.81 if name != "pitch" else 1), 0)
+    (note,) = unit_warnings(log.with_channels(**{name: moved}), None)
+    assert "the zero of one of the two moved" in note
+    assert float(note.split()[1]) == pytest.approx(80, abs=3)
+    off = float(note.split("soil resistance is ")[1].split()[0])
+    assert off == pytest.approx(share, rel=0.1)
+    unmoved = log.channels["acceleration_x"] + 0.0008 * log.time  # .16 m/s²: warmed up
+    assert unit_warnings(log.with_channels(acceleration_x=unmoved), None) == []

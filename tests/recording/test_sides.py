@@ -198,3 +198,16 @@ def test_simulated_torques_of_left_and_right_exchanged_are_named_and_right_ones_
     assert any("in turns the wheel that is faster than its hub would brake" in note for note in notes)
     alike = families.draw(families.Kind("robot", "brixius", "even", "rolling"), 36078)
     assert unit_warnings(alike.recording, alike.vehicle) == []
+
+
+@pytest.mark.parametrize("factor", [1.2, 1 / 1.2])
+def test_one_rim_that_is_apart_where_the_other_axle_is_level_is_named_without_a_gyroscope(
+    factor: float,
+) -> None:
+    """A wrong number of teeth: the wheel's slip was .17 off, and a gyroscope alone told it."""
+    log = skidding()
+    bare = replace(log, channels={n: v for n, v in log.channels.items() if n != "angular_velocity_z"})
+    assert notes_on(bare) == []
+    (note,) = notes_on(bare, wheel_speed_fl=factor)
+    assert note.startswith(f"Straight ahead the rim of fl goes {factor:.2f} times as fast as that of fr")
+    assert not any("Straight ahead the rim" in one for one in notes_on(bare, wheel_speed_fl=1.07))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.recording.pitch import pitch_warnings
+from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.window_means import window_means
@@ -122,6 +122,7 @@ def motion_warnings(
         notes += _pull_warnings(means, thrusts, recording, vehicle) or _silent_cell(recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
+        found = found or zero_warnings(recording, means, forward)
         found = found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
     else:
         found = _thrust_warnings(means, thrusts, vehicle)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.recording.noise import MAD_TO_SD
+from terragrip.recording.ranks import median
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -21,6 +23,10 @@ _SCALE = 1.3  # an accelerometer's own scale is 2 % off at most
 _LATE = 0.1  # s, surely beyond it: filters; and half a window of slow samples
 _FAR = 1.0  # windows: beyond it, the first order does not hold
 _BLOCKS = 20  # of windows, for the jackknife: with half as many, right logs had lags of 4.9 standard errors (299 drives; now 3.1)
+_LONG = 20  # windows before and after a zero moves
+_MOVED = 0.2  # m/s², .02 of the weight: calibrated zeros are known to .03, and warm up by less than this
+_BEYOND = 6.0  # standard deviations of a window
+_STAYS = 3.0  # times what it changes from half to half of either side
 _CAUSES = (
     (1.745, "the grade in per cent, declared as degrees: write 'unit: \"%\"'"),
     (100.0, "the grade in per cent: write 'unit: \"%\"'"),
@@ -54,6 +60,35 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
         reason = f"it may be {cause} for it in the profile" if distance < 0.25 else "check its unit and scale"
         return [f"pitch is {times:.2g} times the climb that the accelerometer shows: {reason}."]
     return _late_warnings(recording, means, means.climb, observed)
+
+
+def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
+    """A sentence where the accelerometer's reading beyond speed and pitch leaps and stays so: a zero that moved in the drive."""
+    if means.climb is None:
+        return []
+    rest = forward - means.change - means.climb
+    known = np.isfinite(rest)
+    rest, count = rest[known], int(known.sum())
+    if count < 2 * _LONG:
+        return []
+    place = np.arange(_LONG, count - _LONG + 1)
+    total = np.cumsum(rest)
+    apart = (total[-1] - total[place - 1]) / (count - place) - total[place - 1] / place
+    at = int(place[np.argmax(np.abs(apart) * np.sqrt(place * (count - place)))])
+    sides = rest[:at], rest[at:]
+    low, high = (median(side) for side in sides)
+    leap = high - low
+    scatter = MAD_TO_SD * median(np.abs(np.r_[sides[0] - low, sides[1] - high]))
+    halves = [part for side in sides for part in np.array_split(side, 2)]
+    drift = max(abs(median(halves[k]) - median(halves[k + 1])) for k in (0, 2))
+    if not abs(leap) > max(_MOVED, _BEYOND * scatter, _STAYS * drift):
+        return []
+    when = recording.time[0] + (np.flatnonzero(means.rows)[known][at] - 0.5) * means.length
+    return [
+        f"From {when:.4g} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
+        f"before: the zero of one of the two moved, and soil resistance is {abs(leap) / STANDARD_GRAVITY:.2g} off before or after. Correct "
+        "it there, or calibrate and estimate both parts apart."
+    ]
 
 
 def _late_warnings(recording: Recording, means: Means, climb: Floats, observed: Floats) -> list[str]:

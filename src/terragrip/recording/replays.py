@@ -51,7 +51,7 @@ def _hashes(coded: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 
 def _longest(rows: npt.NDArray[np.int64]) -> tuple[int, int, int]:
-    """First and last of the longest run of rows (n,) that are equal to those at one distance before them, and that distance; 0: there is none."""
+    """First and last of the longest run of rows (n,) equal to those at one distance before them, and that distance (0: none is)."""
     order = np.argsort(rows, kind="stable")
     again = np.flatnonzero(rows[order[1:]] == rows[order[:-1]])
     distance = np.zeros(len(rows), dtype=np.intp)
