@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,](?P<part>\d{1,9}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:(?:[.,]|:(?=\d{3}))(?P<part>\d{1,9}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
 _TIME = re.compile(_CLOCK)
 _NAMED = (
     re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}),?[ T]+{_CLOCK}"),

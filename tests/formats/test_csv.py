@@ -335,6 +335,7 @@ def test_a_header_that_lacks_a_name_is_no_line_before_it(tmp_path: Path) -> None
     ("form", "is_date"),
     [
         ("%H:%M:%S.%f", False),
+        ("%H:%M:%S:%f", False),
         ("%d.%m.%Y %H:%M:%S,%f", True),
         ("%Y/%m/%d %H:%M:%S.%f", True),
         ("%Y-%m-%d %H:%M:%S,%f", True),

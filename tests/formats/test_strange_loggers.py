@@ -13,6 +13,7 @@ from terragrip.formats import read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.recognition import Proposal, propose
 from terragrip.formats.vocabulary import GENERAL
+from terragrip.vehicle import Vehicle
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 TIME = np.arange(0.0, 120.0, 0.05)
@@ -73,6 +74,36 @@ def test_a_speed_of_strange_words_beside_one_over_ground_keeps_its_question_mark
     assert _propose(columns)["wheel_based_speed"].doubt != ""
 
 
+@pytest.mark.parametrize(
+    ("true", "theoretical"),
+    [
+        ("Vitesse réelle (km/h)", "Vitesse théorique (km/h)"),
+        ("Wahre Geschwindigkeit [km/h]", "Theoretische Geschwindigkeit [km/h]"),
+        ("Velocidad real (km/h)", "Velocidad teórica (km/h)"),
+        ("Velocità effettiva [km/h]", "Velocità teorica [km/h]"),
+        ("Werkelijke snelheid [km/h]", "Theoretische snelheid [km/h]"),
+    ],
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_theoretical_speed_is_the_wheels_in_any_language(true: str, theoretical: str, first: int) -> None:
+    """The one of both that stood first was proposed as the ground speed, and the other one left out."""
+    pair = [(true, 3.6 * SPEED), (theoretical, 4.0 * SPEED)]
+    result = _propose(dict(pair[first:] + pair[:first]))
+    assert result["ground_speed"].entry["from"] == true
+    assert result["wheel_based_speed"].entry["from"] == theoretical
+
+
+def test_a_wheel_that_the_vehicle_does_not_have_is_in_doubt() -> None:
+    wheels = {"radius": RADIUS, "inertia": 1.0}
+    vehicle = Vehicle.from_dict(
+        {"mass": 900.0, "axles": {"only": {"mass": 900.0, "wheels": ["l", "r"]}}, "wheel": wheels}
+    )
+    torques = {f"torque_{wheel}_Nm": 100 + 10 * SPEED for wheel in ("left", "right", "middle_left")}
+    result = propose(torques, (), {}, dict.fromkeys(torques, TIME), vehicle=vehicle)
+    assert result["drive_torque_l"].doubt == ""
+    assert result["drive_torque_ml"].doubt == "the vehicle's wheels are l, r"
+
+
 def test_speeds_of_numbered_drives_are_not_over_ground() -> None:
     columns = {"drivers0.measured_velocity": SPEED, "drivers1.measured_velocity": 1.1 * SPEED}
     assert "ground_speed" not in _propose(columns)
@@ -117,6 +148,15 @@ def test_a_receivers_velocities_in_the_plane_go_together() -> None:
         ("/drive_torque_fl.data", "drive_torque_fl"),
         ("drive shaft torque FL", None),
         ("/gps_0/fix/latitude", "latitude"),
+        ("Effort de traction (daN)", "drawbar_force"),
+        ("effort traction roue AVG (N.m)", "drive_torque_fl"),
+        ("Forza di traino [kN]", "drawbar_force"),
+        ("Draught force [kN]", "drawbar_force"),
+        ("Force attelage (daN)", "drawbar_force"),
+        ("ground speed doppler [km/h]", "ground_speed"),
+        ("Radumfangsgeschwindigkeit [km/h]", "wheel_based_speed"),
+        ("Getriebegeschwindigkeit [km/h]", None),
+        ("Front axle torque [Nm]", None),
     ],
 )
 def test_names_in_other_languages_and_paths(name: str, channel: str | None) -> None:

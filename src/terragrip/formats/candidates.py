@@ -224,7 +224,10 @@ def _of_place(column: Column) -> list[Hint]:
     ):
         return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
     words = set(name.words)
-    if name.has("current", "torque", "lateral", "vertical") or name.axis in ("y", "z"):
+    torque = name.has("torque") and not (
+        "effort" in words and name.has("pull")
+    )  # effort de traction: a force
+    if torque or name.has("current", "lateral", "vertical") or name.axis in ("y", "z"):
         return []
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in words)):
         return [("drawbar_force", 0.85, "a pull")]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ Texts = Mapping[str, npt.NDArray[Any]]
 SURE = 0.7
 """Confidence from which a proposal carries no question mark."""
 
+_OF_WHEELS = ("wheel_speed", "drive_torque")
 _EITHER_SIDE = re.compile(r"^(?!.*mot).*antrieb", re.IGNORECASE)  # the drive: before the gear or behind it
 
 
@@ -107,7 +108,8 @@ def propose(
     for name in texts:
         if name in LABELS or vocabulary.read(name).has("soil"):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
-    result = Proposals({_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()})
+    named = {_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()}
+    result = Proposals({channel: _held_against(vehicle, channel, p) for channel, p in named.items()})
     result.left_out = tuple(_left_out(ranked, chosen, vehicle))
     return result
 
@@ -131,6 +133,14 @@ def _in_the_vehicle(channel: str, vehicle: Vehicle | None) -> str:
     """A wheel's channel by the name that the vehicle has for the wheel."""
     quantity, wheel = split_channel(channel) or ("", "")
     return f"{quantity}_{own_name(vehicle, wheel)}" if wheel else channel
+
+
+def _held_against(vehicle: Vehicle | None, channel: str, proposal: Proposal) -> Proposal:
+    """A proposal, in doubt where the vehicle has no such wheel."""
+    quantity, wheel = split_channel(channel) or ("", "")
+    if vehicle is None or proposal.doubt or quantity not in _OF_WHEELS or wheel in vehicle.wheels:
+        return proposal
+    return replace(proposal, doubt=f"the vehicle's wheels are {', '.join(vehicle.wheels)}")
 
 
 def silent(

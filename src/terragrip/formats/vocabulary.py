@@ -23,7 +23,7 @@ MEANINGS: dict[str, str] = {
     "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
     "gyro": "gyroscope gyro gyr",
     "rate": "rate angular turn",
-    "pitch": "pitch nick nickwinkel tangage cabeceo beccheggio",
+    "pitch": "pitch assiette nick nickwinkel tangage cabeceo beccheggio",
     "roll": "roll bank wank wankwinkel roulis balanceo rollio",
     "yaw": "yaw psi gier lacet imbardata",
     "heading": "heading hdg course bearing azimuth cog compass",
@@ -31,24 +31,24 @@ MEANINGS: dict[str, str] = {
     "longitude": "longitude laengengrad",
     "altitude": "altitude alt height elevation hoehe",
     "position": "position pose pos easting northing utm",
-    "pull": "drawbar draft pull traction zugkraft tiro trekkracht fdraw fzug ftow fpull",
-    "coupling": "hitch towing trailer",
+    "pull": "drawbar draft draught pull traction tractive zugkraft traino tiro trekkracht fdraw fzug ftow fpull",
+    "coupling": "hitch towing trailer attelage koppelpunkt",
     "force": "force kraft fuerza forza",
     "mass": "mass weight masse gewicht poids peso massa",
     "distance": "distance odometer",
     "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow",
     # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical",
+    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical theorique theoretisch theoretische teorica teorico radumfangs",
     "motor": "motor moteur motore antrieb antriebs esc",
-    "ground": "ground gps gnss radar navigation visual vio lidar icp true location rtk ublox slam "
+    "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",
     "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd avancement",
     "odometry": "odom odometry",
     "soil": "soil terrain surface",
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
     "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
-    "doppler pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
-    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel",
+    "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
+    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank getriebe zapfwelle zapfwellen lenkwinkel",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
@@ -361,4 +361,4 @@ def _wheel_of(words: list[str], last: list[str], concepts: set[str]) -> str:
     side = "l" if "left" in concepts else "r" if "right" in concepts else ""
     end = next((end[0] for end in ("front", "rear", "middle") if end in concepts), "")
     number = next((word for word in last if word.isdigit() and 1 <= int(word) <= 8), "")
-    return (end or number) + side
+    return (end or number) + side if side else number
