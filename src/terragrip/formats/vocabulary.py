@@ -38,7 +38,8 @@ MEANINGS: dict[str, str] = {
     "distance": "distance odometer",
     "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow",
     # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical theorique theoretisch theoretische teorica teorico radumfangs",
+    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical theorique theoretisch theoretische "
+    "teorica teorico radumfangs",
     "motor": "motor moteur motore antrieb antriebs esc",
     "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",
@@ -48,7 +49,8 @@ MEANINGS: dict[str, str] = {
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
     "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
     "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
-    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank getriebe zapfwelle zapfwellen lenkwinkel",
+    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel "
+    "getriebe",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
