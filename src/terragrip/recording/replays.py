@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from terragrip.arrays import Ints
 from terragrip.recording.stretches import is_one_value
 
 if TYPE_CHECKING:
@@ -43,14 +43,14 @@ def replay_warnings(recording: Recording) -> list[str]:
     ]
 
 
-def _hashes(coded: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _hashes(coded: Ints) -> Ints:
     """A number for each row (n,) of channels (k, n), equal where all values are."""
     factors = np.random.default_rng(0).integers(1 << 62, size=len(coded), dtype=np.int64) | 1
     mixed = coded ^ (coded >> np.int64(29))
     return np.sum(mixed * factors[:, None], axis=0)
 
 
-def _longest(rows: npt.NDArray[np.int64]) -> tuple[int, int, int]:
+def _longest(rows: Ints) -> tuple[int, int, int]:
     """First and last of the longest run of rows (n,) equal to those at one distance before them, and that distance (0: none is)."""
     order = np.argsort(rows, kind="stable")
     again = np.flatnonzero(rows[order[1:]] == rows[order[:-1]])
