@@ -2,7 +2,7 @@
 
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
-The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py,
+The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, rest.py,
 torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, and torques.py's least
 thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
 the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques
@@ -43,6 +43,7 @@ LIMITS = {
     "frozen": "_TIMES _FINE _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
+    "rest": "_STILL _ROLLING_OUT _SHIFT _SURE _ALIKE",
     "replays": "_CHANNELS _CHANGES",
     "torques": "_LEAST",
     "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
@@ -144,6 +145,8 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         vehicle,
     )
     yield "odometry", "odometry", log.with_channels(ground_speed=np.mean(rims, axis=0)), vehicle
+    rest = 0.08 * size
+    yield "ground speed's zero", "zero is off", changed(log, "ground_speed", by=lambda v: v + rest), vehicle
     yield "speed held 8 s", "repeats", changed(log, "ground_speed", by=held), vehicle
     yield "torque held 8 s", "repeats", changed(log, torques[0], by=held), vehicle
     yield "hung 8 s", "the logger hung", changed(log, "", by=held), vehicle

@@ -91,3 +91,11 @@ def test_a_clock_that_begins_anew_at_another_time_is_another_log(tmp_path: Path)
     log = log_of(tmp_path / "log.csv", tod=(50_000 + SECONDS) % 50_300)
     with pytest.raises(InputError, match="goes back"):
         tg.read(log, by_profile("tod"))
+
+
+@pytest.mark.parametrize("stamp", ["23/10/2023 07:55", "05:03.2", "07:55"])
+def test_stamps_that_are_no_times_are_refused_with_what_to_write(tmp_path: Path, stamp: str) -> None:
+    """As a spreadsheet exports what it shows; 'leave the cell empty or give a number' was no fix."""
+    log = log_of(tmp_path / "log.csv", Zeit=[stamp] * COUNT)
+    with pytest.raises(InputError, match="is not a time; give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5"):
+        tg.read(log, by_profile("Zeit"))

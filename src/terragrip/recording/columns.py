@@ -13,7 +13,7 @@ from terragrip.errors import InputError
 from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
-from terragrip.written_times import doubt, misfit, times_of
+from terragrip.written_times import FORMS, doubt, misfit, times_of
 
 
 def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
@@ -132,6 +132,10 @@ def stamps_of(
     if odd is not None:
         problem = f"{_shown(cells[odd])} is not a time, as the rows before have it"
         raise InputError(problem, file=source, place=place(name, odd), hint="correct or delete that row")
+    first = next((row for row, cell in enumerate(cells) if cell), None)
+    if first is not None and ":" in str(cells[first]):
+        problem = f"{_shown(cells[first])} is not a time"
+        raise InputError(problem, file=source, place=place(name, first), hint=FORMS)
     return column
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part, quantum, usual_values
+from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
@@ -21,7 +22,7 @@ _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: wh
 _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _SEVERAL = 4  # channels
 _MEASURED = 4  # values that are the same
-_FINE = 0.02  # of a speed: smaller steps show its noise
+_FINE, _NOISY = 0.02, 3e-4  # of a speed: smaller steps show its noise, and less is a simulated one's
 _CHANGES = 20  # of a channel's value: fewer show no resolution
 _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
 
@@ -73,17 +74,17 @@ def _by_steps(what: Floats, step: float) -> bool:
 
 def _together(recording: Recording, speeds: dict[str, Floats]) -> list[str]:
     """A sentence where all channels, or all speeds while others go on, keep their values for long while the vehicle drives."""
-    if "ground_speed" not in speeds or len(recording) < 3:
-        return []
     changing = {n: v for n, v in recording.channels.items() if not is_one_value(v) and np.isfinite(v).any()}
+    if "ground_speed" not in changing or len(recording) < 3:
+        return []
     if len(changing) >= _SEVERAL and (stretch := _kept(recording, changing)):
         return [
             f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
         ]
     moved = {n: v for n, v in speeds.items() if n in changing}
-    if len(moved) < 2 or "ground_speed" not in moved or not (stretch := _kept(recording, moved)):
+    if len(moved) < 2 or not (stretch := _kept(recording, moved)):
         return []
-    if any(_step_of(v) > _FINE for v in moved.values()):  # a cruise may stay within a step
+    if not all(_is_restless(recording.time, v) for v in moved.values()):
         return []
     return [
         f"All speeds keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s while other channels go on: not measured, it seems. "
@@ -91,10 +92,11 @@ def _together(recording: Recording, speeds: dict[str, Floats]) -> list[str]:
     ]
 
 
-def _step_of(values: Floats) -> float:
-    """The distance of a channel's values, of its size."""
-    known = values[np.isfinite(values)]
-    return quantum(known) / max(quantile(np.abs(known), 0.95), 1e-9)
+def _is_restless(time: Floats, values: Floats) -> bool:
+    """Whether a channel (n,) has noise, and steps fine enough to show it: one that has not may keep its value in a cruise."""
+    when, what = known_part(time, values)
+    size = quantile(np.abs(what), 0.95)
+    return quantum(what) < _FINE * size and (white_noise(when, what) or 0.0) > _NOISY * size
 
 
 def _kept(recording: Recording, channels: dict[str, Floats]) -> tuple[float, float] | None:

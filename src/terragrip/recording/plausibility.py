@@ -26,6 +26,7 @@ from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_wa
 from terragrip.recording.plain_units import angle_warnings, gravity_warnings, spacing_warnings
 from terragrip.recording.position_speed import position_warnings
 from terragrip.recording.replays import replay_warnings
+from terragrip.recording.rest import rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
@@ -195,6 +196,7 @@ _EACH = (
     Check("frozen", lambda log: frozen_warnings(log.whole), _TIME, needs_wheels=False),
     Check("dropouts", lambda log: dropout_warnings(log.whole), _TIME, needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
     Check("codes", lambda log: log.codes, needs_wheels=False),
     Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
     Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),
