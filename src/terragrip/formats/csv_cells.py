@@ -68,6 +68,10 @@ def parse(
     types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS}
     try:
         table = _arrow(body, dialect, chosen, types)
+        # Arrow takes 05:03, minutes and seconds, for hours and minutes
+        clocks = {field.name: pa.string() for field in table.schema if pa.types.is_time(field.type)}
+        if clocks:
+            table = _arrow(body, dialect, chosen, types | clocks)
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
         return {
