@@ -55,8 +55,7 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)
     if rows:
-        why = f"while the vehicle moves, at up to {band:.2g} m/s: they cannot measure less, or the ground speed is "
-        "wrong at rest. Slip is missing there (event gap)."
+        why = f"while the vehicle moves, at up to {band:.2g} m/s: they cannot measure less, so slip is missing there (event gap)."
         if band == _WIDEST:
             why = (
                 f"where ground_speed is {band:.2g} m/s or more: wheel speeds are missing, or the ground speed is wrong at rest. "
