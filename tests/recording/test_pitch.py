@@ -9,6 +9,7 @@ import pytest
 
 from terragrip.recording import Recording, unit_warnings
 from terragrip.simulation import families
+from terragrip.vehicle import Vehicle
 
 Case = tuple[families.Kind, int, float]
 MACHINES: list[Case] = [
@@ -81,3 +82,21 @@ def test_a_zero_that_moves_in_the_drive_is_named_with_the_instant(case: Case, na
     assert off == pytest.approx(share, rel=0.1)
     unmoved = log.channels["acceleration_x"] + 0.0008 * log.time  # .16 m/s²: warmed up
     assert unit_warnings(log.with_channels(acceleration_x=unmoved), None) == []
+
+
+@pytest.mark.parametrize("case", MACHINES[1:])
+def test_an_accelerometer_further_off_than_the_vehicle_file_says_is_named_until_it_is_calibrated(
+    case: Case,
+) -> None:
+    """Soil resistance was .05 off, eight of its standard deviations, behind .5 m/s², without a word."""
+    kind, seed, rate = case
+    vehicle = families.draw(kind, seed, rate=rate, duration=10.0).vehicle
+    log = drive(*case)
+    assert vehicle.uncertainty.acceleration_bias == 0.03
+    off = log.with_channels(acceleration_x=log.channels["acceleration_x"] + 0.5)
+    assert unit_warnings(log, vehicle) == []
+    (note,) = unit_warnings(off, vehicle)
+    assert "more than speed and pitch explain, where the vehicle file's acceleration_bias is 0.03" in note
+    assert float(note.split()[2]) == pytest.approx(0.5, abs=0.1)
+    calibrated = Vehicle.from_dict(vehicle.to_dict() | {"calibration": {"acceleration_bias_x": 0.5}})
+    assert unit_warnings(off, calibrated) == []

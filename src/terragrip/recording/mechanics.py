@@ -37,6 +37,10 @@ PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
+_OFFSET_SURE, _OFFSET_LEAST = (
+    4.0,
+    0.2,
+)  # of the bias that the vehicle file states, and m/s²: .02 of the weight
 _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
@@ -123,7 +127,9 @@ def motion_warnings(
     if forward is not None:
         found = _balance_warnings(recording, means, forward, thrusts, vehicle)
         found = found or zero_warnings(recording, means, forward)
-        found = found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward)
+        found = (
+            found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward, vehicle)
+        )
     else:
         found = _thrust_warnings(means, thrusts, vehicle)
     return [*notes, *found]
@@ -304,17 +310,23 @@ def _silent_cell(recording: Recording, vehicle: Vehicle) -> list[str]:
     ]
 
 
-def _offset_warnings(means: Means, forward: Floats) -> list[str]:
-    """The accelerometer's reading beyond the change of ground speed and the climb by the pitch, on average."""
+def _offset_warnings(means: Means, forward: Floats, vehicle: Vehicle | None) -> list[str]:
+    """The accelerometer's reading beyond the change of ground speed and the climb by the pitch, on average, less what was calibrated."""
     if means.climb is None:
         return []
     rest = forward - means.change - means.climb
+    if vehicle is not None:
+        found = vehicle.calibration
+        rest = rest - found.acceleration_bias_x + STANDARD_GRAVITY * np.sin(found.pitch_offset)
     known = np.isfinite(rest)
     offset = median(rest[known]) if known.sum() >= _LEAST else 0.0
-    if abs(offset) < _OFFSET:
+    stated = None if vehicle is None else vehicle.uncertainty.acceleration_bias
+    most = _OFFSET if stated is None else min(_OFFSET, max(_OFFSET_SURE * stated, _OFFSET_LEAST))
+    if abs(offset) < most:
         return []
+    beside = "" if stated is None else f", where the vehicle file's acceleration_bias is {stated:.2g}"
     return [
-        f"acceleration_x reads {offset:.2g} m/s² more than speed and pitch explain: its bias or its mounting, which "
+        f"acceleration_x reads {offset:.2g} m/s² more than speed and pitch explain{beside}: its bias or its mounting, which "
         "'terragrip calibrate' finds."
     ]
 
