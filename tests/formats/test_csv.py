@@ -545,3 +545,22 @@ def test_three_dashes_are_no_value(tmp_path: Path) -> None:
     log.write_text("time,ground_speed,wheel_speed_l\n0,1,2\n0.1,---,2.1\n0.2,1.1,---\n")
     table = read_table(log)
     assert np.isnan(table.columns["ground_speed"]).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_a_name_that_occurs_twice_is_in_the_way_of_that_column_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, long: bool
+) -> None:
+    """A bus and a receiver both write 'Speed': inspect refused the log for a column that nobody asked for."""
+    rows = "".join(f"{k / 10},{k % 7},{k % 5},{k % 3},{k % 2}\n" for k in range(100))
+    path = put(tmp_path, "t [s],Speed,v [m/s],Speed,w [rad/s]\n" + rows)
+    if long:
+        looking = sys.modules["terragrip.formats.inspect"]
+        monkeypatch.setattr(looking, "_LONG", 0)
+        monkeypatch.setattr(looking, "_ENOUGH", 500)
+    report = inspect(path)
+    assert "Columns that occur twice are left out: Speed. Rename one to use it." in report.warnings
+    profile = {"time": {"from": "t"}, "channels": {"ground_speed": "v", "wheel_speed_l": "w"}}
+    assert len(read(path, Profile.from_dict(profile))) == 100
+    with pytest.raises(InputError, match="column Speed: occurs twice"):
+        read(path, Profile.from_dict(profile | {"channels": {"ground_speed": "Speed", "wheel_speed_l": "w"}}))

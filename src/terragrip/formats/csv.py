@@ -59,10 +59,13 @@ def csv_on_disk(path: str) -> TableOnDisk:
             row += max((len(column) for column in columns.values()), default=0)
             yield columns
 
-    names = tuple(name for name in dialect.names if name)
-    return TableOnDisk(
-        names, dialect.units, path, rows, blocks, notes, is_long=whole is None and length > _LONG
-    )
+    named = [name for name in dialect.names if name]
+    names = tuple(dict.fromkeys(named))
+    twice = tuple(name for name in names if named.count(name) > 1)
+    if twice:
+        notes.append(f"Columns that occur twice are left out: {', '.join(twice)}. Rename one to use it.")
+    is_long = whole is None and length > _LONG
+    return TableOnDisk(names, dialect.units, path, rows, blocks, notes, is_long=is_long, unreadable=twice)
 
 
 def _text_of(path: str) -> bytes:

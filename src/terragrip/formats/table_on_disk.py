@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.files import sha256
-from terragrip.formats.table import LogTable, Wanted, every_of
+from terragrip.formats.table import LogTable, Sparse, Wanted, every_of
 
 Column = npt.NDArray[Any]
 Columns = dict[str, Column]
@@ -44,7 +44,10 @@ class TableOnDisk:
     def whole(self, wanted: Wanted | None) -> LogTable:
         """The wanted columns (None: all) of all blocks; raises InputError as these do."""
         every = every_of(wanted)
-        chosen = [n for n in self.names if (n not in self.unreadable if wanted is None else wanted(n))]
+        if wanted is None or isinstance(wanted, Sparse):
+            chosen = [name for name in self.names if name not in self.unreadable]
+        else:
+            chosen = [name for name in self.names if wanted(name)]
         parts: dict[str, list[Column]] = {name: [] for name in chosen}
         for block in self.blocks(chosen, every):
             for name, values in block.items():
