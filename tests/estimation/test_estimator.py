@@ -118,6 +118,7 @@ def test_an_estimate_is_read_by_name(noisy):
         ({"time": None}, "time is None"),
         ({"ground_speed": math.inf}, "ground_speed is inf"),
         ({"drive_torque_fl": -math.inf}, "drive_torque_fl is -inf"),
+        ({"wheel_speed_fl": math.nan, "ground_speed": math.inf}, "ground_speed is inf"),  # NaN: not measured
         ({"ground_speed": "fast"}, "ground_speed is 'fast'"),
         ({"wheel_sped_fl": 2.0}, "knows no wheel_sped_fl; did you mean wheel_speed_fl"),
         ({"wheel_speed_fl2": 2.0}, "knows no wheel_speed_fl2; did you mean wheel_speed_fl"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -177,3 +178,19 @@ def test_slip_from_speeds_alone_counts_the_delay() -> None:
     wider = late["ground_speed_std"] - sure["ground_speed_std"]
     assert np.nanmax(wider) > 0.01
     assert np.nanmin(wider) >= 0.0
+
+
+def test_of_a_long_log_no_more_is_read_ahead_than_shows_its_lag(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alignment, "ROWS", 100)
+    read = []
+
+    def blocks() -> Iterator[Recording]:
+        for k in range(5):
+            read.append(k)
+            time = 40.0 * k + 0.1 * np.arange(400)
+            yield Recording.from_frame(
+                {"time": time, "ground_speed": 1 + 0.01 * time, "wheel_speed_l": 3 + 0.03 * time}
+            )
+
+    assert len(next(aligned(blocks()))) == 400
+    assert read == [0]

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pytest
 
 from terragrip.errors import InputError
-from terragrip.recording.checks import place
+from terragrip.recording.checks import how_to_pivot, place
 from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
 
 
@@ -122,3 +122,9 @@ def test_where_a_cell_stands() -> None:
     assert place("a", 0, time) == "column a, row 1 (time 0.25 s)"
     assert place("a", 1, time) == "column a, row 2"
     assert place("a", 0, time, first_row=100) == "column a, row 101 (time 0.25 s)"
+
+
+def test_a_table_is_long_where_names_stand_beside_values() -> None:
+    assert "columns='Signal name', values='value'" in (how_to_pivot(["t", "Signal name", "value"]) or "")
+    for columns in (["t", "Signal name"], ["t", "value"], ["t", "speed"]):
+        assert how_to_pivot(columns) is None

@@ -46,6 +46,36 @@ def test_a_lag_is_of_the_clock_beyond_twice_its_deviation_and_what_is_explained(
     assert Lag(seconds, std, 0.99, explained).is_of_the_clock is certain
 
 
+@pytest.mark.parametrize(
+    ("seconds", "std", "explained", "certain"),
+    [
+        (0.5, 0.0625, (0.0, 0.25), False),  # just four times its deviation above what is explained
+        (0.5, 0.06, (0.0, 0.25), True),
+        (-0.5, 0.0625, (-0.25, 0.0), False),
+        (-0.5, 0.06, (-0.25, 0.0), True),
+        (0.3125, 0.03, (0.0, 0.25), True),  # twice is enough where it is sharp
+        (0.3125, 0.031, (0.0, 0.25), False),
+        (0.6, 0.02, (0.5, 0.75), False),
+    ],
+)
+def test_a_lag_is_corrected_beyond_four_times_its_deviation_or_twice_a_small_one(
+    seconds: float, std: float, explained: tuple[float, float], certain: bool
+) -> None:
+    assert Lag(seconds, std, 0.99, explained).is_to_correct is certain
+
+
+@pytest.mark.parametrize(("std", "explained"), [(0.02, (0.0, 0.06)), (0.3, (0.0, 0.06)), (0.01, (-0.2, 0.0))])
+def test_a_sensors_delay_is_what_was_found_and_what_is_usual_together(
+    std: float, explained: tuple[float, float]
+) -> None:
+    """Root mean square of a normal prior of .1 s times the likelihood of what was found, summed up on a grid [s]."""
+    delay, own = np.linspace(-3.0, 3.0, 60_001), np.var(np.linspace(*explained, 100_001))
+    found = 0.1 - np.mean(explained)
+    density = np.exp(-0.5 * (delay / 0.1) ** 2 - 0.5 * (delay - found) ** 2 / (std**2 + own))
+    expected = np.sqrt(np.sum(delay**2 * density) / np.sum(density))
+    assert Lag(0.1, std, 0.9, explained).delay == pytest.approx(expected, rel=1e-3)
+
+
 def test_why_a_lag_is_left_is_given() -> None:
     assert "no more than twice" in Lag(-0.25, 0.125, 0.9, (0.0, 1.0)).why_not
     assert Lag(0.25, 0.1, 0.9, (-0.375, 0.0)).why_not.endswith("follows its wheels by up to 0.38 s")

@@ -7,7 +7,7 @@ import pytest
 
 import terragrip as tg
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.reverse import reverse_warnings
+from terragrip.recording.reverse import _go_alike, reverse_warnings
 
 TRACK, RADIUS = 0.8, 0.3
 TIME = np.arange(0, 300, 0.1)
@@ -178,3 +178,12 @@ def test_wheels_without_a_sign_beside_a_ground_speed_with_one_are_named() -> Non
         columns[wheel] = np.abs(hub) / 0.95 / RADIUS
     (note,) = reverse_warnings(Recording.from_frame(columns), machine())
     assert "of the turns angular_velocity_z contradicts the wheels' speeds" in note
+
+
+def test_sizes_go_alike_where_both_vary_together() -> None:
+    draws = np.random.default_rng(6)
+    a, other = np.abs(draws.standard_normal((2, 40)))
+    assert _go_alike(a, 3.0 * a + 0.3 * other)
+    assert not _go_alike(a, other)
+    assert not _go_alike(a, np.ones(40))
+    assert not _go_alike(a[:5], a[:5])

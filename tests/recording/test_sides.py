@@ -85,6 +85,14 @@ def test_exchanged_torques_need_a_rate_of_turn() -> None:
     assert exchanged(unseen, "fl", "fr") == []
 
 
+def test_without_torques_none_are_exchanged() -> None:
+    """Nor where an axle has one torque alone."""
+    log = skidding()
+    for lost in ("drive_torque", "drive_torque_fl"):
+        left = replace(log, channels={n: v for n, v in log.channels.items() if not n.startswith(lost)})
+        assert exchanged_torques(left, vehicle(), log.channels["angular_velocity_z"]) == []
+
+
 @pytest.mark.parametrize(("size", "said"), [(1.0, True), (0.05, False)])
 def test_torques_that_hardly_differ_in_turns_show_no_exchange(size: float, said: bool) -> None:
     """Differences below a thirtieth of a wheel's load may be the ground's, or the sensors'."""

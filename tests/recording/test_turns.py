@@ -92,6 +92,13 @@ def test_an_exchange_must_make_both_axles_alike_from_side_to_side(
     assert _uneven(np.full((4, 20), 2.0), steady, np.ones(4), [(0, 1), (2, 3)], loads) == pairs
 
 
+def test_torques_count_where_the_vehicle_pulls() -> None:
+    """It coasts for most of the drive, at torques of nothing but an offset that all have."""
+    torques = np.hstack([np.outer([4, 2, 2, 4], np.ones(20)), np.full((4, 60), 0.2)])
+    found = _uneven(np.full((4, 80), 2.0), torques, np.ones(4), [(0, 1), (2, 3)], np.array([1.0, 2.0]))
+    assert found == [(0, 2)]
+
+
 def test_of_wheels_of_unlike_radii_the_pulls_are_compared_with_the_loads() -> None:
     """Torques of a steady tractor, in closed form: front left and rear right exchanged, which front right and rear left
     would mend too, were the torques compared."""

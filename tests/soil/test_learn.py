@@ -116,6 +116,20 @@ def test_a_curve_that_falls_is_sorted_by_slip():
     assert any("falls within the bins" in words for words in campaign.words)
 
 
+def test_a_form_that_cannot_follow_the_data_is_said():
+    """The prototype, of ground whose curve rises at a third of its rate."""
+    slow, pairs = {"A": 0.5, "k": 4.0, "d": 0.0}, []
+    for seed in range(3):
+        columns = table(seed)
+        for w in WHEELS:
+            columns[f"adhesion_{w}"] = CURVES["effective"].value(columns[f"slip_{w}"], slow)
+        pairs += usable_pairs(columns, WHEELS, 2.6, f"run {seed}")
+    campaign = learn_soils([p for p in pairs if p.soil == "fine"], AdhesionCurve(bootstrap=0))
+    verdict = campaign.soils["fine"].verdict
+    assert not verdict.follows
+    assert f"fine: {verdict.sentence}" in campaign.words
+
+
 @pytest.mark.parametrize(("loss", "falls"), [(0.0, False), (0.05, False), (0.6, True)])
 def test_only_a_curve_that_comes_down_by_a_twentieth_of_its_top_falls(loss, falls):
     """0.6 (1 - e^(-25 s)) - d s, which the paper's form cannot follow: at 60 % slip it is 0, 3 and 52 % below its top."""
