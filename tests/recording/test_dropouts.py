@@ -111,3 +111,10 @@ def test_a_wheel_of_few_pulses_reads_0_between_them_without_an_error() -> None:
 def test_a_receiver_that_never_reads_anything_but_0_is_named_once() -> None:
     """By `frozen_warnings`, which say that it never changes."""
     assert dropout_warnings(log(ground_speed=0.0)) == []
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.0, 8.0), (192.0, 199.9)])
+def test_wheels_that_read_0_from_the_start_or_to_the_end_are_named(first: float, last: float) -> None:
+    rows = (first <= TIME) & (last >= TIME)
+    (note,) = dropout_warnings(log(wheel_speed_l=np.where(rows, 0.0, log().channels["wheel_speed_l"])))
+    assert note.startswith(f"wheel_speed_l is 0 from {first:g} to {last:g} s while the vehicle drives")

@@ -159,3 +159,11 @@ def test_wheels_that_hardly_ever_leave_0_do_not_change_while_a_speed_is_repeated
     ground = np.where(rows, 1.5, log().channels["ground_speed"])
     dead = log(ground_speed=ground, wheel_speed_l=flicker, wheel_speed_r=flicker)
     assert frozen_warnings(dead) == []
+
+
+def test_a_drive_in_which_everything_rises_is_no_logger_that_hung() -> None:
+    """It speeds up under a growing pull for ten seconds; later it stands."""
+    rows, stands = (TIME >= 20) & (TIME <= 30), np.abs(TIME - 100) < 10
+    rising = {n: np.where(rows, v[rows][0] + 0.05 * (TIME - 20), v) for n, v in pulling().channels.items()}
+    rising["ground_speed"] = np.where(stands, 0.0, rising["ground_speed"])
+    assert frozen_warnings(pulling(**rising)) == []
