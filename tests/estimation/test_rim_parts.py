@@ -230,6 +230,9 @@ def test_rims_that_read_zero_while_the_vehicle_moves_have_a_dead_band(
     assert (result, count) == (pytest.approx(band), rows if band else 0)
     turning = {**speeds, "wheel_speed_rr": np.full(120, 2.5)}
     assert _dead_band(log_of(ground_speed=ground, **turning), RIMS) == (0.0, 0)
+    once = np.where(np.arange(120) == 50, 2.0, np.nan)
+    assert _dead_band(log_of(ground_speed=once, **speeds), RIMS) == (0.0, 0)
+    assert _dead_band(log_of(ground_speed=np.full(120, np.nan), **speeds), RIMS) == (0.0, 0)
 
 
 REST = "from 12 windows of the lightest work (the vehicle file says 0.8000 m)"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.clock import clock_times
 from terragrip.vehicle import Vehicle
 
 WHEELS = ("fl", "fr", "rl", "rr")
@@ -218,3 +220,26 @@ def test_rounded_stamps_are_told_from_a_row_that_stands_twice(stamps: np.ndarray
     once[100] = once[99]
     with pytest.raises(InputError, match=r"row 101 .*: time repeats; keep one row per instant"):
         Recording.from_frame(columns | {"time": once})
+
+
+def test_clock_times_are_those_of_the_calendar_in_utc() -> None:
+    start = datetime(2026, 3, 1, 0, 30, tzinfo=timezone(timedelta(hours=2)))
+    dates = clock_times(np.array([0.0, 1.25, 86400.0]), start)
+    assert dates.astype(str).tolist() == [
+        "2026-02-28T22:30:00.000000",
+        "2026-02-28T22:30:01.250000",
+        "2026-03-01T22:30:00.000000",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("time", "why"),
+    [
+        (np.floor(np.arange(20) / 2), "rounded, or stored with too few digits"),
+        (np.r_[0:10, 9:20], "keep one row per instant"),
+    ],
+)
+def test_stamps_that_repeat_are_rounded_where_many_do(time: np.ndarray, why: str) -> None:
+    speeds = {"ground_speed": np.ones(len(time)), "wheel_speed_l": np.ones(len(time))}
+    with pytest.raises(InputError, match=why):
+        Recording.from_frame({"time": time, **speeds})

@@ -128,3 +128,9 @@ def test_a_table_is_long_where_names_stand_beside_values() -> None:
     assert "columns='Signal name', values='value'" in (how_to_pivot(["t", "Signal name", "value"]) or "")
     for columns in (["t", "Signal name"], ["t", "value"], ["t", "speed"]):
         assert how_to_pivot(columns) is None
+
+
+def test_an_index_named_time_is_the_time_and_no_other_is() -> None:
+    for name, columns in (("time", ["time", "a"]), ("row", ["a"]), ("zone", ["a"])):
+        frame = pd.DataFrame({"a": [1.0, 2.0]}, index=pd.Index([0.0, 0.5], name=name))
+        assert list(columns_of(frame, None)) == columns

@@ -65,6 +65,13 @@ def test_how_far_a_slope_is_from_one_is_a_factor() -> None:
     assert Fit() == Fit(0.0, np.inf, 0.0)
 
 
+def test_without_a_ground_speed_there_are_no_means() -> None:
+    time = np.arange(0.0, 100.0, 0.1)
+    assert means_of(Recording(time, {"ground_speed": np.full(1000, np.nan)})) is None
+    assert means_of(Recording(time, {"wheel_speed_l": np.ones(1000)})) is None
+    assert means_of(Recording(time, {"ground_speed": np.ones(1000)})) is not None
+
+
 def test_means_of_windows_with_holes() -> None:
     place = np.array([0, 0, 1, 1, 1, 3])
     values = np.array([1.0, 3.0, np.nan, 5.0, 7.0, np.nan])

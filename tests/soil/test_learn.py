@@ -10,6 +10,7 @@ from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BinSettings, bin_pairs
 from terragrip.soil.choice import compare_forms
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.known import known_soils
 from terragrip.soil.learn import RunPairs, _falls, learn_soils, usable_pairs
 from terragrip.soil.transitions import settled
 from test_pull_bins import drive
@@ -72,10 +73,14 @@ def test_pull_of_the_advice_brings_the_vehicle_there():
 
 def test_the_papers_bins_stand_beside_those_by_pull():
     pairs = [p for seed in range(8) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
-    learned = learn_soils(pairs).soils["fine"]
+    campaign = learn_soils(pairs)
+    learned = campaign.soils["fine"]
     assert learned.curve.bins_.settings.by == "pull"
     assert learned.verdict.follows
-    assert not any(learned.verdict.sentence in words for words in learn_soils(pairs).words)
+    assert not any(learned.verdict.sentence in words for words in campaign.words)
+    again = known_soils(campaign.library(), ["fine"]).soils["fine"].by_slip  # as a report draws it
+    plain = learned.by_slip.bins_
+    np.testing.assert_allclose(again.bins_.slip, plain.slip[plain.used])
     slip, adhesion = (
         np.concatenate([getattr(p, k) for p in pairs if p.soil == "fine"]) for k in ("slip", "adhesion")
     )

@@ -44,17 +44,20 @@ def test_the_scatter_of_each_soil_is_seen() -> None:
 
 def test_the_jacobian_is_that_of_finite_differences() -> None:
     """Where the model fits but for next to nothing, so that weights and spreads stand still."""
-    near = replace(_Problem.of(rows(np.zeros(2))).refined(TRUE), local=np.full(400, 0.1))
+    data, true = rows(np.zeros(2)), np.r_[TRUE, 0.0]  # the yaw rate's error comes last
+    by_yaw = np.array([-0.25, 0.25, -0.25, 0.25]) / np.random.default_rng(2).uniform(0.2, 0.4, (400, 1))
+    turning = _Problem.of(replace(data, by_yaw=by_yaw, yaw_std=0.02))
+    near = replace(turning.refined(true), local=np.full(400, 0.1))
     nothing = 1e-9 * np.random.default_rng(1).choice([-1.0, 1.0], near.data.torque.shape)
-    torque = near.data.torque - near._levels(TRUE)[1] + nothing
+    torque = near.data.torque - near._levels(true)[1] + nothing
     problem = replace(near, data=replace(near.data, torque=torque))
-    fit, spread = problem.fit(TRUE, 1.0), problem._levels(TRUE)[2]
+    fit, spread = problem.fit(true, 1.0), problem._levels(true)[2]
     plain = np.all(fit.weight == 1.0, axis=1)  # no window's level is moved by a weight
     assert plain.mean() > 0.5
     step = 1e-5
-    for unknown in range(12):
-        aside = step * (np.arange(12) == unknown)
-        change = problem._levels(TRUE - aside)[1] - problem._levels(TRUE + aside)[1]
+    for unknown in range(13):
+        aside = step * (np.arange(13) == unknown)
+        change = problem._levels(true - aside)[1] - problem._levels(true + aside)[1]
         expected = (change / (2 * step) / spread)[plain]
         size = np.abs(expected).max()
         np.testing.assert_allclose(fit.jacobian[plain, :, unknown], expected, atol=1e-6 * size)
