@@ -118,12 +118,11 @@ def served(folder: Path, port: int) -> Iterator[Served]:
 
 
 @pytest.fixture(scope="session")
-def tab(browser: Any) -> Iterator[Any]:
+def tab(browser: Any) -> Any:
     """The tab of every `page`: pages of one address in one tab share a process and its compiled scripts, half of what loading one takes."""
     context = browser.new_context(viewport=SCREEN, bypass_csp=False)
     context.set_default_timeout(PATIENCE)
-    yield context.new_page()
-    context.close()
+    return context.new_page()
 
 
 @pytest.fixture
