@@ -239,7 +239,8 @@ def _of_place(column: Column) -> list[Hint]:
 def _of_speed(column: Column) -> list[Hint]:
     name = column.name
     along = "twist" in name.words and "linear" in name.words
-    if not (name.has("speed") or along) or name.wheel:
+    by_unit = name.has("ground") and column.kind == "speed"  # GPS [km/h]
+    if not (name.has("speed") or along or by_unit) or name.wheel:
         return []
     if column.one_of_several and not name.has("ground", "odometry", "body"):
         return []
