@@ -193,11 +193,13 @@ static void chatter_of(tg_estimator *e, const tg_drive *drive)
 
 static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
 {
+    const int32_t n = e->settings.machine.wheels;
     tg_real *o = out->value;
     memcpy(e->scene.load, drive->load, sizeof drive->load);
-    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+    for (int32_t i = 0; i < n; i++) {
         e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
         e->scene.across[i] = e->settings.wheel_ahead[i] * e->yaw_rate;
+        e->scene.turn[i] = tgi_turn_variance(&e->settings, i, e->belief.x[n + 2 + i], e->belief.x[n + 1], (tg_real)e->direction * e->unseen_turn);
     }
     chatter_of(e, drive);
     e->scene.direction = (tg_real)e->direction;

@@ -49,6 +49,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
     tg_real chatter[8]; /* wheel: variance of an adhesion that alternates from sample to sample, see inputs.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
+    tg_real turn[8]; /* wheel: variance of its slip by a turn that no sensor shows */
     tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */
     tg_real any_silent; /* whether any is, or the drawbar force */
     tg_real direction, standing, seen_motion; /* standing: or else without a slip */
@@ -188,7 +189,7 @@ typedef struct { /* see speeds.c; all reals, since a smoother's record is this *
     tg_real begun;                    /* 1: any of them was, so that the state is one */
     tg_real dt, manoeuvre, slipping;  /* how this row was reached: s, mean densities */
     tg_real anew;                     /* 1: nothing links this row to the one before */
-    tg_real yaw, standing;
+    tg_real yaw, unseen_turn, standing;
     tg_real open;                     /* 1: the rims read nothing that slip could be computed from */
     tg_real slow;                     /* variance of the ground speed's error that does not average out (slow_speed.c) */
     tg_real off;                      /* 1, -1: the last ground speed lay above, below what was expected, and counted less; 0: neither */
@@ -242,6 +243,7 @@ struct tg_estimator {
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample */
+    tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate; else 0 */
     double slow_time;          /* when the ground speed was last near 0 */
     tg_lowpass soon[8], soon_ground; /* speeds, low-passed as little as can be */
     tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;

@@ -90,7 +90,7 @@ const tgi_field tgi_consider_fields[] = {REALS(tg_consider, s), REALS(tg_conside
 const tgi_field tgi_estimator_fields[] = {
     REALS(T, deviations), INTEGERS(T, started), INTEGERS(T, seen_motion), INTEGERS(T, standing), INTEGERS(T, direction), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
-    HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time),
+    HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), INTEGERS(T, sparse_wheels), INTEGERS(T, unseen), REALS(T, yaw_rate), DOUBLES(T, yaw_time), REALS(T, unseen_turn),
     DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(soon_ground), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
     LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed),
     DOUBLES(T, ground_time), REALS(T, shock),

@@ -32,11 +32,11 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
     side->count++;
 }
 
-/* An SD without what the ground speed's delay makes of it, and what the filter has not followed of it yet: both grow as a vehicle digs in,
- * and the warning is not to wait for that, nor to call a vehicle slow for it. */
-static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real speed)
+/* An SD without what the ground speed's delay makes of it, what the filter has not followed of it yet, and a `turn` that no sensor shows: the
+ * first two grow as a vehicle digs in, and the warning is not to wait for that, nor to call a vehicle slow for it; a turn's sides cancel. */
+static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, tg_real speed)
 {
-    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - (scene->late + scene->disputed) / tgi_square(speed), 0)) : deviation;
+    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - turn - (scene->late + scene->disputed) / tgi_square(speed), 0)) : deviation;
 }
 
 /* What the powered wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
@@ -53,7 +53,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
         const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], mu = o[TG_OUT_ADHESION + i];
-        const tg_real deviation = in_time(o[TG_OUT_SLIP_STD + i], &e->scene, tgi_max(tgi_fabs(rim), tgi_fabs(o[TG_OUT_GROUND_SPEED])));
+        const tg_real deviation = in_time(o[TG_OUT_SLIP_STD + i], &e->scene, e->scene.turn[i], tgi_max(tgi_fabs(rim), tgi_fabs(o[TG_OUT_GROUND_SPEED])));
         if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], deviation, rim);
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], deviation, rim);
         l.rim += rim;
@@ -81,7 +81,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
-    l.travel_deviation = in_time(o[TG_OUT_GROUND_SPEED_STD], &e->scene, 1);
+    l.travel_deviation = in_time(o[TG_OUT_GROUND_SPEED_STD], &e->scene, 0, 1);
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
     return l;
 }
@@ -154,7 +154,8 @@ static void judge_push(tg_estimator *e, const tg_drive *drive, const tg_real *o,
     const tg_real weight = drive->mass * e->settings.machine.gravity;
     tg_real thrust = 0, least = s->push * weight;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) thrust += o[TG_OUT_ADHESION + i] * drive->load[i];
-    if (least < 2 * e->settings.noise[TG_DRAWBAR_FORCE]) least = 2 * e->settings.noise[TG_DRAWBAR_FORCE];
+    const tg_real zero = e->settings.uncertainty.drawbar_offset;
+    least = tgi_max(least, 2 * tgi_sqrt(tgi_square(e->settings.noise[TG_DRAWBAR_FORCE]) + tgi_square(zero)));
     const int32_t bar = e->drawbar.count > 0 && (tg_real)e->direction * drive->calm_drawbar < -least;
     const int32_t unexplained = o[TG_OUT_SOIL_RESISTANCE] + 2 * o[TG_OUT_SOIL_RESISTANCE_STD] < 0;
     w->pushed = count_seconds(w->pushed, dt, (bar || unexplained) && thrust > s->thrust * weight, 2, s->push_duration);

@@ -104,7 +104,34 @@ int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time)
     return f->seen && time - f->time <= (wheel ? (double)e->settings.gap : TG_GROUND_AGE);
 }
 
-/* The yaw rate as last measured; after a second without it the vehicle is assumed to drive straight. */
+/* The yaw rate if no wheel slipped more than its axle's others: that of the axle where the rims of left and right differ least, since a turn
+ * shows on every one, and a wheel that spins on its own. */
+static tg_real turn_of_rims(const tg_estimator *e, double time)
+{
+    const tg_settings *s = &e->settings;
+    tg_real least = 0;
+    int32_t axles = 0;
+    for (int32_t k = 0; k < s->axles; k++) {
+        tg_real count = 0, side = 0, rim = 0, squares = 0, products = 0;
+        for (int32_t i = 0; i < s->machine.wheels; i++) {
+            if (s->wheel_axle[i] != k || !tgi_is_recent(e, i, time)) continue;
+            const tg_real speed = s->rolling_radius[i] * e->wheel_speed[i].value;
+            count++;
+            side += s->wheel_side[i];
+            rim += speed;
+            squares += tgi_square(s->wheel_side[i]);
+            products += s->wheel_side[i] * speed;
+        }
+        if (count < 2 || !(squares > side * side / count)) continue;
+        const tg_real rate = -(products - side * rim / count) / (squares - side * side / count);
+        if (axles && rate * least <= 0) return 0;
+        if (!axles || tgi_fabs(rate) < tgi_fabs(least)) least = rate;
+        axles++;
+    }
+    return least;
+}
+
+/* The yaw rate as last measured; after a second without it the vehicle is assumed to drive straight, or to turn as its rims may do. */
 void tgi_track_turn(tg_estimator *e, const tg_row *row)
 {
     if (!isnan(row->value[TG_YAW_RATE])) {
@@ -113,6 +140,7 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
     } else if (row->time - e->yaw_time > 1) {
         e->yaw_rate = 0;
     }
+    e->unseen_turn = row->time - e->yaw_time > 1 ? turn_of_rims(e, row->time) : 0;
 }
 
 /* Whether the ground speed contradicts standstill: while no wheel turns, for half a second, since a single jump is the sensor's. */

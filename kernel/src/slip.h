@@ -27,4 +27,14 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
     return result;
 }
 
+/* Variance of the slip of wheel i by a turn of which the rims show `rate`: where wheels steer it is all of that, where they skid about half.
+ * `v`: of the vehicle. */
+TG_INLINE tg_real tgi_turn_variance(const tg_settings *s, int32_t i, tg_real omega, tg_real v, tg_real rate)
+{
+    if (rate == 0) return 0;
+    const tg_real hub = tgi_hub_of(v - s->wheel_side[i] * rate, s->wheel_ahead[i] * rate), radius = s->rolling_radius[i];
+    const tg_real change = tgi_slip_of(omega, hub, radius, s->standstill_speed).slip - tgi_slip_of(omega, v, radius, s->standstill_speed).slip;
+    return change * change / 2;
+}
+
 #endif

@@ -283,6 +283,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     else s->anew = 0;
     s->dt = dt;
     s->yaw = e->yaw_rate;
+    s->unseen_turn = e->unseen_turn;
     s->standing = (tg_real)e->standing;
     const int32_t blind = rims_are_blind(e, row, &any);
     if (any || e->standing) s->open = (tg_real)blind;
@@ -306,6 +307,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     tgi_speeds_report(&e->settings, s, out->value);
     const int32_t open = is_blind(s, n);
     e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]) + s->slow;
+    for (int32_t i = 0; i < n; i++) e->scene.turn[i] = tgi_turn_variance(&e->settings, i, out->value[TG_OUT_WHEEL_SPEED + i], s->x[0], s->unseen_turn);
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
     out->event = tgi_event_of(e, row, (gap && !first) || open, 0);
 }

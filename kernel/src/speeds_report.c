@@ -12,10 +12,10 @@ void tgi_speeds_report(const tg_settings *set, const tgi_speeds *s, tg_real *o)
     for (int32_t i = 0; i < set->machine.wheels; i++) {
         const int32_t k = 2 + i;
         const tg_real r = set->rolling_radius[i], hub = tgi_hub_of(s->x[0] - set->wheel_side[i] * s->yaw, set->wheel_ahead[i] * s->yaw);
-        const tg_real omega = (hub + s->x[k]) / r;
+        const tg_real omega = (hub + s->x[k]) / r, turn = tgi_turn_variance(set, i, omega, s->x[0], s->unseen_turn);
         const tg_real vv = s->P[0][0], wv = (vv + s->P[0][k]) / r, ww = (vv + 2 * s->P[0][k] + s->P[k][k]) / (r * r);
         const tgi_slip g = tgi_slip_of(omega, hub, r, set->standstill_speed);
-        const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * (vv + off) + tgi_square(g.radius * error);
+        const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * (vv + off) + turn + tgi_square(g.radius * error);
         const int32_t slips = known && s->open == 0 && s->standing == 0;
         o[TG_OUT_WHEEL_SPEED + i] = known ? omega : nan;
         o[TG_OUT_WHEEL_SPEED_STD + i] = known ? tgi_root(ww) : nan;

@@ -84,7 +84,7 @@ TG_INLINE void traction(const tg_settings *restrict s, const tg_real *restrict x
     }
     for (int i = 0; i < n; i++) {
         const tgi_slip g = tgi_slip_of(x[n + 2 + i], tgi_hub_of(v + scene->hub[i], scene->across[i]), s->rolling_radius[i], s->standstill_speed);
-        const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv;
+        const tg_real slip_variance = g.wheel * (g.wheel * c->ww[i] + 2 * g.ground * c->wv[i]) + g.ground * g.ground * c->vv + scene->turn[i];
         o[TG_OUT_SLIP + i] = g.slip;
         o[TG_OUT_SLIP_STD + i] = bounded_root(slip_variance + tgi_square(g.radius * error));
 

@@ -80,3 +80,44 @@ def test_what_a_vehicle_turns_about() -> None:
 
 def test_the_speed_of_a_hub_has_the_sign_of_the_travel() -> None:
     np.testing.assert_allclose(hub_speed([3.0, -3.0, 2.0], [4.0, 4.0, 0.0]), [5.0, -5.0, 2.0])
+
+
+def without_gyroscope(log: Recording, torques: bool) -> Recording:
+    lost = ("angular_velocity_z",) if torques else ("angular_velocity_z", "drive_torque")
+    return replace(log, channels={n: v for n, v in log.channels.items() if not n.startswith(lost)})
+
+
+@pytest.mark.parametrize("torques", [True, False])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_slips_interval_holds_a_turn_that_no_sensor_shows(torques: bool, direction: int) -> None:
+    """Turns were outside of it; straight on it stays as narrow as with a gyroscope."""
+    log = headlands(direction)
+    seen = estimate(
+        without_gyroscope(log, torques).with_channels(angular_velocity_z=log.channels["angular_velocity_z"]),
+        tractor(),
+    )
+    blind = estimate(without_gyroscope(log, torques), tractor())
+    yaw = np.abs(log.channels["angular_velocity_z"])
+    turning, straight = (
+        (yaw > 0.3) & (log.time > 10),
+        (yaw < 1e-9) & (log.time % 30 > 5) & (log.time % 30 < 16),
+    )
+    off = np.array([np.abs(blind[f"slip_{w}"] - SLIP) / blind[f"slip_{w}_std"] for w in WHEELS])
+    assert np.mean(off[:, turning] < 1.96) > 0.95
+    assert np.mean(off[:, straight] < 1.96) > 0.95
+    for wheel in WHEELS:
+        ratio = blind[f"slip_{wheel}_std"][straight] / seen[f"slip_{wheel}_std"][straight]
+        assert np.median(ratio) < 1.05
+
+
+@pytest.mark.parametrize("torques", [True, False])
+def test_a_wheel_that_spins_alone_is_no_turn(torques: bool) -> None:
+    """A turn shows on every axle."""
+    log = headlands()
+    yaw, time = log.channels["angular_velocity_z"], log.time
+    straight, spins = (yaw == 0) & (time > 40) & (time < 47), (time > 40) & (time < 44)
+    faster = log.channels["wheel_speed_fl"] * np.where(spins, 1.5, 1.0)
+    spun = estimate(without_gyroscope(log, torques).with_channels(wheel_speed_fl=faster), tractor())
+    calm = estimate(without_gyroscope(log, torques), tractor())
+    late = straight & (time > 42) & (time < 44)
+    assert np.median(spun["slip_rl_std"][late] / calm["slip_rl_std"][late]) < 1.3

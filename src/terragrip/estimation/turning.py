@@ -103,7 +103,7 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     advice = "Log the yaw rate throughout" if _YAW_RATE in log.channels else "Give a yaw rate, or positions"
     return [
         f"The rims of left and right differ in {share:.0%} of the driving, where no signal shows how fast the machine turned: the slips of "
-        f"both sides are wrong there. {advice}."
+        f"both sides may be wrong by that, which their intervals hold. {advice}."
     ]
 
 
