@@ -75,6 +75,24 @@ def test_a_ground_speed_without_a_sign_is_named() -> None:
     assert said(unsigned(drive(backward=False), "ground_speed")) == ""
 
 
+def test_a_ground_speed_without_a_sign_is_no_wrong_pull() -> None:
+    """Backward without the tool thrust counted as forward, and its changes as the pull's: 'unit: lbf' was advised for a right cell."""
+    draws = np.random.default_rng(3)
+    speed = np.clip(3 * np.sin(TIME / 5), -1.0, 1.0)
+    pull = 120 * 9.81 * np.clip(speed, 0.0, None) * (0.05 + 0.02 * np.sin(TIME / 3))
+    thrust = 120 * np.gradient(speed, TIME) + pull + 70 * np.tanh(speed / 0.05)
+
+    def noisy(values: np.ndarray, size: float) -> np.ndarray:
+        return values + size * draws.standard_normal(len(TIME))
+
+    columns = {"time": TIME, "ground_speed": noisy(speed, 0.01), "drawbar_force": noisy(pull, 2.0)}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        columns[f"wheel_speed_{wheel}"] = noisy(speed / 0.97 / RADIUS, 0.02)
+        columns[f"drive_torque_{wheel}"] = noisy(RADIUS * thrust / 4, 0.3)
+    assert said(columns) == ""
+    assert said(unsigned(columns, "ground_speed")).startswith("ground_speed has no sign")
+
+
 def test_speeds_without_a_sign_are_named_by_the_gyroscope() -> None:
     both = unsigned(unsigned(drive(), "ground_speed"), "wheel_speed")
     assert "contradicts the wheels' speeds: if these have no sign" in said(both)

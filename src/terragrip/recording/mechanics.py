@@ -17,6 +17,7 @@ from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import radius_warnings
+from terragrip.recording.schema import rim_names
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -90,6 +91,12 @@ class Means:
         inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
         return np.r_[np.nan, inner, np.nan][self.rows]
 
+    def moved(self, recording: Recording) -> Floats:
+        """dv/dt + g sin(pitch) (n,) [m/s²]: the accelerometer's reading, else by the ground speed and the climb that is known."""
+        if "acceleration_x" in recording.channels:
+            return self.of(recording.channels["acceleration_x"])
+        return self.change + (0.0 if self.climb is None else self.climb)
+
     def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> Fit:
         """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: without the effect of climbs."""
         known = np.isfinite(y) & np.isfinite(x)
@@ -154,6 +161,8 @@ def means_of(recording: Recording) -> Means | None:
     if place.min() < 0 or place.max() >= count:  # time decreases: refused elsewhere
         return None
     mean = window_means(speed, place, count)
+    for name in rim_names(recording.channels):  # a ground speed without a sign is positive in reverse, too
+        mean[window_means(recording.channels[name], place, count) < 0] = np.nan
     if float(np.nansum(mean)) <= 0:
         return None
     change = np.r_[np.nan, (mean[2:] - mean[:-2]) / (2 * length), np.nan]
@@ -281,8 +290,10 @@ def _pull_warnings(
     known = np.isfinite(pull) & np.isfinite(left)
     if known.sum() < _LEAST:
         return []
-    pulled, rest = float(np.mean(pull[known])), float(np.mean(left[known]))
-    if pulled < -PULL:
+    moved = means.moved(recording) / STANDARD_GRAVITY
+    pulled, rest = float(np.mean(pull[known])), float(np.nanmean((left - moved)[known]))
+    together = means.fit(left + pull - moved, pull)
+    if pulled < -PULL and together.slope < _SURE * together.error:  # else a trailer pushes downhill
         return [
             f"drawbar_force is {pulled:.2g} of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile."
         ]

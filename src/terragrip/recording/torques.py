@@ -61,7 +61,8 @@ def _scale_warnings(
             f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, which no ground can bear: check "
             f"the torques' unit and scale {check}."
         ]
-    if mean < -_BRAKING:
+    left = rest - means.moved(recording)
+    if mean < -_BRAKING and np.nanmean(left) < 0:  # else a slope, or a trailer, pushes
         return [
             f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, while the vehicle drives "
             "forward: write 'sign: -1' for each in the profile."
@@ -74,10 +75,7 @@ def _scale_warnings(
         ]
     if not towing:
         return []
-    moved = means.change + (0.0 if means.climb is None else means.climb)
-    if "acceleration_x" in recording.channels:
-        moved = means.of(recording.channels["acceleration_x"])
-    return _pull_scale(means.fit(thrust - moved, pull))
+    return _pull_scale(means.fit(thrust - means.moved(recording), pull))
 
 
 def _pull_scale(fit: Fit) -> list[str]:
