@@ -6,6 +6,7 @@ import asyncio
 import gc
 import os
 from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=place)
 
 
+@cache
 def _room(path: Path) -> str:
     """The folder below tests in which a file stands; empty beside the rooms."""
     return next(iter(path.relative_to(TESTS).parts[:-1]), "")

@@ -99,7 +99,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
                 pool.close()
             return
         limit: Any = "auto" if memory is None else _bytes(memory)
-        with distributed.LocalCluster(  # type: ignore[no-untyped-call]
+        with distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             memory_limit=limit,
@@ -107,7 +107,7 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
             silence_logs=logging.CRITICAL,
         ) as cluster:
             pool = Pool(
-                lambda: distributed.Client(cluster, set_as_default=False),  # type: ignore[no-untyped-call]
+                lambda: distributed.Client(cluster, set_as_default=False),
                 "this machine",
                 lambda: cluster.scale(workers),
             )
@@ -146,7 +146,7 @@ def check_address(address: str) -> None:
 def _client(address: str) -> Any:
     from distributed import Client
 
-    return Client(address, timeout=5, set_as_default=False)  # type: ignore[no-untyped-call]
+    return Client(address, timeout=5, set_as_default=False)
 
 
 def _bytes(text: str) -> int:
