@@ -12,19 +12,24 @@ void tgi_reset_slips(tg_estimator *e)
     m->way = e->settings.tuned.uneven_memory;
 }
 
-/* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. */
+/* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. A wheel that
+ * is silent itself says nothing of the ground speed, unless all are: its belief follows from the ground speed. */
 static void means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
 {
     const int32_t n = e->settings.machine.wheels;
-    tg_real load = 0, pull = 0, speed = 0;
+    tg_real load = 0, pull = 0, speed = 0, believed = 0;
+    int32_t heard = 0;
     for (int32_t i = 0; i < n; i++) {
         load += drive->load[i];
         pull += drive->load[i] * e->belief.x[i];
         const int32_t known = row && !isnan(row->value[TG_WHEEL_SPEED + i]) && !(row->doubt[i] > 0);
         const tg_real omega = known ? (tg_real)e->direction * row->value[TG_WHEEL_SPEED + i] : e->belief.x[n + 2 + i];
-        speed += e->settings.rolling_radius[i] * omega;
+        const int32_t counts = !row || known || row->time - e->wheel[i].time <= (double)e->settings.tuned.silence;
+        speed += counts ? e->settings.rolling_radius[i] * omega : 0;
+        believed += e->settings.rolling_radius[i] * omega;
+        heard += counts;
     }
-    *rim = speed / (tg_real)n;
+    *rim = heard ? speed / (tg_real)heard : believed / (tg_real)n;
     *adhesion = pull / load;
 }
 

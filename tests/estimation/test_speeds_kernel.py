@@ -107,6 +107,14 @@ def test_an_error_that_lasts_a_few_samples_widens_the_interval_as_in_the_twin() 
     assert np.allclose(estimates["ground_speed_std"], np.sqrt(np.add(spread, slow)), rtol=1e-9)
 
 
+def test_the_distance_is_the_way_that_was_driven() -> None:
+    time = np.arange(0, 20, 0.1)
+    speed = 1.5 + 0.3 * np.sin(time)
+    columns = {"time": time, "ground_speed": speed, "wheel_speed_a": speed / 0.9 / RADIUS}
+    estimates = tg.estimate(tg.Recording.from_frame(columns), machine(("a",)))
+    assert estimates["distance"][-1] == pytest.approx(np.trapezoid(speed, time), rel=0.01)
+
+
 def test_a_receiver_that_drifts_is_seen_at_stops() -> None:
     """An error of half the stated noise that stays for half a minute: slip from speeds alone was held in 63 % of these rows."""
     held = []
