@@ -198,3 +198,59 @@ def test_a_curve_that_explains_nothing_is_not_a_soil():
     campaign = learn_soils(usable_pairs(columns, WHEELS, 2.6, "run"))
     assert set(campaign.not_fitted) == {"fine", "coarse"}
     assert "does not explain" in campaign.not_fitted["fine"]
+
+
+def light_work(runs=6, metres=120.0, a=0.9, top=0.04, noise=0.02, shift=0.0):
+    """Drives whose pulls ask for at most ``top`` of slip, each pair's slip with an error of SD ``noise`` and all with ``shift``."""
+    rng = np.random.default_rng(0)
+    n = round(10 * metres)
+    pairs = []
+    for run in range(runs):
+        true = np.repeat(rng.uniform(0.002, top, n // 20), 20)
+        mu = CURVES["exponential"].value(true, {"a": a})
+        slip = true + shift + noise * rng.standard_normal(n)
+        stretch, way, steady = np.arange(n) // 100, np.full(n, 0.1), np.ones(n)
+        pairs.append(
+            RunPairs(
+                f"run {run}", "field", slip, mu, np.full(n, noise), mu, stretch, way, 0.06 * steady, steady
+            )
+        )
+    return pairs
+
+
+def test_a_machine_that_works_at_low_slip_gets_its_curve():
+    """Below 5 % of slip nothing was learned by pull, and by slip noise alone: "not fitted", or a curve half as high and sure of it."""
+    learned = learn_soils(light_work()).soils["field"]
+    assert learned.curve.bins_.settings.by == "pull"
+    assert learned.soil.parameters["a"] == pytest.approx(0.9, rel=0.04)
+    assert learned.curve.identifiability_.identifiable
+
+
+def test_without_any_slip_of_the_papers_range_there_is_a_curve_and_no_papers_fit_beside_it():
+    learned = learn_soils(light_work(noise=0.002)).soils["field"]
+    assert learned.by_slip is learned.curve
+    assert learned.soil.parameters["a"] == pytest.approx(0.9, rel=0.02)
+
+
+def test_an_error_of_zero_slip_that_all_runs_share_widens_the_interval_by_what_it_moves_the_curve():
+    """Against fits to slips that are all off by one SD."""
+    sd = 0.004
+
+    def fitted(shift, **error):
+        return learn_soils(light_work(noise=0.002, shift=shift), **error).soils["field"].soil
+
+    up, down = (fitted(shift).parameters["a"] for shift in (sd, -sd))
+    low, high = fitted(0.0, common_slip_sd=sd).interval["a"]
+    plain_low, plain_high = fitted(0.0).interval["a"]
+    assert (high - low) / 2 == pytest.approx(1.96 * (down - up) / 2, rel=0.15)
+    assert plain_high - plain_low < 0.2 * (high - low)
+
+
+def test_sorted_by_slip_a_curve_that_noise_bends_is_not_called_fixed():
+    """The badge said yes to curves a third too low."""
+    curve = AdhesionCurve(bins=BinSettings(by="slip"))
+    learned = learn_soils(light_work(top=0.1, noise=0.04), curve).soils["field"]
+    assert learned.slip_noise.moved > 0.1
+    assert learned.soil.parameters["a"] < 0.85
+    assert not learned.curve.identifiability_.identifiable
+    assert any("noise moves the curve" in note for note in learned.curve.notes_)

@@ -10,13 +10,11 @@ from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
 from terragrip.arrays import Floats
-from terragrip.soil.estimates import torque_scale_sd
+from terragrip.soil.estimates import torque_scale_sd, zero_slip_sd
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
-RADIUS_SD = 0.02
-"""Of the rolling radius where the vehicle file does not say (docs/vehicle.md)."""
 SHARE_OF_VARIATION = 0.5
 """Relative SD of a library's resistance where it does not say."""
 GROWTH = (0.06, 0.05)
@@ -40,7 +38,7 @@ def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
     draws = draw_curves(
         samples,
         common_sd=torque_scale_sd(vehicle),
-        radius_sd=_radius_sd(vehicle),
+        radius_sd=zero_slip_sd(vehicle),
         wheel_radius=float(vehicle.wheel_radius[vehicle.driven].mean()),
         offset_sd=float(max(np.nanmedian(samples.resistance_std), stated)),
     )
@@ -65,7 +63,9 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     slip_sd = float(soil.fit.get("slip_noise", {}).get("slip_std", np.nan))
     if not np.isfinite(slip_sd):
         slip_sd = 0.0 if samples is None else float(np.median(samples.slip_std))
-    error = lasting_sd(_radius_sd(vehicle), slip_sd) * rng.standard_normal((DRAWS + 1, 1))
+    known = float(soil.fit.get("common_slip_sd", 0.0))  # in the soil's own interval
+    beyond = np.sqrt(max(lasting_sd(zero_slip_sd(vehicle), slip_sd) ** 2 - known**2, 0.0))
+    error = beyond * rng.standard_normal((DRAWS + 1, 1))
     width[0], growth[0], shift[0], error[0] = 0.0, GROWTH[0], 0.0, 0.0
     if samples is not None:
         level = float(np.average(samples.resistance, weights=samples.metres))
@@ -82,11 +82,6 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     rho = np.maximum(level + spread * shift + growth * (GRID - at), 0.0)
     reach = max((float(one["slip"]) for one in soil.bins), default=float(GRID[-1]))
     return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, driven), mu, reach)
-
-
-def _radius_sd(vehicle: Vehicle) -> float:
-    known = vehicle.uncertainty.wheel_radius
-    return RADIUS_SD if known is None else known
 
 
 def _band(soil: Soil) -> tuple[Floats, Floats]:

@@ -33,11 +33,13 @@ def command(
     ] = "exponential",
     free: Annotated[bool, typer.Option("--free", help="Fit all parameters, not the paper's one.")] = False,
     weights: Annotated[bool, typer.Option("--weights", help="Weight bins by their samples.")] = False,
-    lower: Annotated[float, typer.Option(help="Lowest slip of the bins.")] = 0.05,
+    lower: Annotated[
+        float | None, typer.Option(help="Lowest slip of the bins; 0.005 by pull, 0.05 by slip.")
+    ] = None,
     upper: Annotated[
         float, typer.Option(help="Highest slip of the bins; on grass 0.40, as in the paper.")
     ] = 0.60,
-    width: Annotated[float, typer.Option(help="Width of a bin.")] = 0.01,
+    width: Annotated[float | None, typer.Option(help="Width of a bin; 0.005 by pull, 0.01 by slip.")] = None,
     by: Annotated[
         str,
         typer.Option(
@@ -76,7 +78,7 @@ def command(
     depends on weak and strong spots; the paper's fit, sorted by slip, is given beside it.
     """
     from terragrip.errors import InputError
-    from terragrip.soil.bins import BinSettings
+    from terragrip.soil.bins import BinSettings, chosen_bins
     from terragrip.soil.digitised import soils_of_points
     from terragrip.soil.estimates import soils_of
     from terragrip.soil.fit import FREE, AdhesionCurve
@@ -87,15 +89,15 @@ def command(
     base = SoilLibrary.load(merge) if merge else None
     other = SoilLibrary.load(compare) if compare else None
     try:
-        bins = BinSettings(width, lower, upper, minimum, by, metres, runs)
+        bins = chosen_bins(by, width, lower, upper, minimum=minimum, metres=metres, runs=runs)
     except ValueError as error:
         raise InputError(
             str(error), place="--width, --lower, --upper, --by, --metres, --runs", hint="choose other bins"
         ) from None
     curve = AdhesionCurve(model, FREE if free else None, weights="count" if weights else None, bins=bins)
-    usual = BinSettings()
+    usual = chosen_bins(by)
     special: dict[str, BinSettings] | None = (
-        None if (width, lower, upper) == (usual.width, usual.lower, usual.upper) else {}
+        None if (bins.width, bins.lower, bins.upper) == (usual.width, usual.lower, usual.upper) else {}
     )
     estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
     if soil is not None and all(path.suffix.lower() == ".json" for path in inputs):

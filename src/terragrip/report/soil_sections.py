@@ -129,7 +129,7 @@ def _preparation(curves: Sequence[SoilCurves]) -> str:
     """How samples became bins."""
     settings = curves[0].learned.curve.bins_.settings
     sentence = (
-        f"Bins of {percent(settings.width, 0)} slip from {percent(settings.lower, 0)} to {percent(settings.upper, 0)}; "
+        f"Bins of {100 * settings.width:g} % slip from {100 * settings.lower:g} % to {percent(settings.upper, 0)}; "
         "samples on a transition or under an event are left out."
     )
     if any(one.learned.curve.bins_.settings.by == BY_PULL for one in curves):

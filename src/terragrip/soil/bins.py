@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,13 +63,38 @@ class BinSettings:
         count = round((self.upper - self.lower) / self.width)
         return np.asarray(self.lower + self.width * np.arange(count + 1), dtype=float)
 
+    def papers(self) -> BinSettings:
+        """Of the paper's fit beside these bins: by slip, no narrower than the paper's, and from no lower, since noise sorts there."""
+        if self.by == BY_SLIP:
+            return self
+        return replace(
+            self, by=BY_SLIP, lower=max(self.lower, PAPER.lower), width=max(self.width, PAPER.width)
+        )
+
     def to_dict(self) -> dict[str, float | str]:
         """The settings as plain numbers and words."""
         return asdict(self)
 
 
+PAPER = BinSettings()
+PULL = BinSettings(by=BY_PULL, width=0.005, lower=0.005)
+"""By pull noise of slip sorts nothing, so the low slips count too: most machines work below 10 % of slip."""
 PAPER_BINS: Mapping[str, BinSettings] = {"grass": BinSettings(upper=0.40)}
 """The paper's exception: on grass only slips up to 40 % (its section on soil characteristics)."""
+
+
+def chosen_bins(
+    by: str, width: float | None = None, lower: float | None = None, upper: float = PAPER.upper, **other: Any
+) -> BinSettings:
+    """Settings by pull or by slip; width and lowest slip are the usual ones of that way where None. ValueError as `BinSettings`."""
+    usual = PULL if by == BY_PULL else PAPER
+    return BinSettings(
+        usual.width if width is None else width,
+        usual.lower if lower is None else lower,
+        upper,
+        by=by,
+        **other,
+    )
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 
+UNSTATED_RADIUS = 0.02
+"""Relative SD of the rolling radius where the vehicle file does not say (docs/vehicle.md)."""
+
+
 def soils_of(
     files: Sequence[str | os.PathLike[str]],
     curve: AdhesionCurve | None = None,
@@ -70,6 +74,7 @@ class GatheredRuns:
     periods: list[float] = field(default_factory=list)
     masses: list[float] = field(default_factory=list)
     common_sd: float = 0.0
+    slip_sd: float = 0.0
     wheels: int = 1
 
     def add(
@@ -97,6 +102,7 @@ class GatheredRuns:
         vehicle = estimates.vehicle
         self.masses.append(vehicle.mass)
         self.common_sd = max(self.common_sd, torque_scale_sd(vehicle))
+        self.slip_sd = max(self.slip_sd, zero_slip_sd(vehicle))
         self.wheels = max(self.wheels, len(estimates.wheels))
 
     def join(self, other: GatheredRuns) -> None:
@@ -109,6 +115,7 @@ class GatheredRuns:
         self.periods += other.periods
         self.masses += other.masses
         self.common_sd = max(self.common_sd, other.common_sd)
+        self.slip_sd = max(self.slip_sd, other.slip_sd)
         self.wheels = max(self.wheels, other.wheels)
 
     def only(self, soil: str) -> GatheredRuns:
@@ -131,11 +138,18 @@ class GatheredRuns:
             self.wheels,
             source=f"{len(self.runs)} runs: {names}",
             common_sd=self.common_sd,
+            common_slip_sd=self.slip_sd,
         )
         plain = {name: learned.soil for name, learned in campaign.soils.items()}
         signed = with_signatures(plain, self.blocks, " and ".join(sorted(self.makers)))
         learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
         return replace(campaign, soils=learned)
+
+
+def zero_slip_sd(vehicle: Vehicle) -> float:
+    """SD of the slip at zero slip, by the rolling radius: all logs of the machine share it."""
+    known = vehicle.uncertainty.wheel_radius
+    return UNSTATED_RADIUS if known is None else known
 
 
 def torque_scale_sd(vehicle: Vehicle) -> float:

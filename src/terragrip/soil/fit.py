@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
-from terragrip.soil.bins import BY_SLIP, Bins, BinSettings, bin_pairs
+from terragrip.soil.bins import Bins, BinSettings, bin_pairs
 from terragrip.soil.identifiability import Identifiability, judge
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
@@ -26,6 +26,8 @@ AT_BOUND = 1e-3
 """Share of a parameter's range that counts as its end."""
 _LARGEST = 1.5
 """Slip above which most rows of a drive never are, as a ratio; in per cent nearly all are."""
+VAGUE = 1.0
+"""Width of a 95 % interval, over the value, from which the data do not fix it."""
 BAND = np.round(np.linspace(0.0, 1.0, 101), 3)
 """Slips that a band is written at."""
 
@@ -55,6 +57,7 @@ class AdhesionCurve:
     seed : of the bootstrap.
     common_sd : relative SD of an error of adhesion that all runs share (the machine's torque scale). Drawing runs does not show it, so it
         widens the intervals.
+    common_slip_sd : SD of an error of slip that all pairs share (zero slip), likewise.
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
     `identifiability_`, `at_bound_` (free parameters that stopped at a bound: the bound gave the value, not the data, so the
@@ -73,6 +76,7 @@ class AdhesionCurve:
         seed: int = 0,
         common_sd: float = 0.0,
         bounds: Mapping[str, tuple[float, float]] | None = None,
+        common_slip_sd: float = 0.0,
     ) -> None:
         if model not in CURVES:
             raise InputError(f"no curve model {model!r}", hint=f"choose one of {', '.join(CURVES)}")
@@ -80,7 +84,7 @@ class AdhesionCurve:
             raise InputError(f"no weighting {weights!r}", hint="use None or 'count'")
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
-        self.common_sd, self.bounds = common_sd, dict(bounds or {})
+        self.common_sd, self.bounds, self.common_slip_sd = common_sd, dict(bounds or {}), common_slip_sd
         self.written_band: tuple[Floats, Floats, Floats] | None = None  # slip, low, high of a stored fit
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
@@ -91,7 +95,7 @@ class AdhesionCurve:
         """
         _refuse_percent(slip)
         labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
-        return self.fit_bins(bin_pairs(slip, adhesion, labels, replace(self.bins, by=BY_SLIP)))
+        return self.fit_bins(bin_pairs(slip, adhesion, labels, self.bins.papers()))
 
     def fit_bins(self, bins: Bins) -> AdhesionCurve:
         """Fit to existing bins. Raises as `fit`."""
@@ -131,7 +135,22 @@ class AdhesionCurve:
         self.interval_: dict[str, tuple[float, float]] = {}
         if self.bootstrap:
             self._resample(curve, free, held, best)
+            self._judge_interval()
         return self
+
+    def _judge_interval(self) -> None:
+        """Take the badge from one free parameter that the interval leaves open, as where the zero of slip is not known."""
+        (name, *more) = self.free_
+        low, high = self.interval_.get(name, (0.0, 0.0))
+        if (
+            more
+            or not self.identifiability_.identifiable
+            or high - low <= VAGUE * abs(self.parameters_[name])
+        ):
+            return
+        sentence = f"The data leave {name} open, {low:.3g} to {high:.3g}: more slip or a better known radius would fix it."
+        self.identifiability_ = replace(self.identifiability_, identifiable=False, sentence=sentence)
+        self.notes_.append(sentence)
 
     def predict(self, slip: ArrayLike) -> Floats:
         """mu (or kappa, with an intercept) at the slips, same shape. Raises InputError where they are per cents."""
@@ -211,6 +230,7 @@ class AdhesionCurve:
             "bins": self.bins_.to_list(),
             "settings": self.bins_.settings.to_dict(),
             "clusters": self.bins_.clusters,
+            "common_slip_sd": self.common_slip_sd,
             "identifiability": {
                 "condition": badge.condition,
                 "identifiable": badge.identifiable,
@@ -285,11 +305,11 @@ class AdhesionCurve:
         slip, mean, used = bins.drawn(times)
         enough = np.count_nonzero(used, axis=1) >= max(len(free), 2)
         slip, mean, weight = slip[enough], mean[enough], (self._bin_weights(bins) * used)[enough]
-        if self.common_sd:
-            mean *= 1 + self.common_sd * rng.standard_normal((len(mean), 1))
+        widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
+        shared = rng.standard_normal((2, len(mean), 1)) / widen  # errors that few runs do not make less known
+        slip, mean = slip + self.common_slip_sd * shared[1], mean * (1 + self.common_sd * shared[0])
         begin = np.repeat(best[None, :], len(slip), axis=0)
         x, _ = solve(curve, free, held, slip, mean, weight, begin, iterations=25)
-        widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
         ends = {p.name: (p.lower, p.upper) for p in curve.parameters}
         lower, upper = zip(*(ends.get(name, (-np.inf, np.inf)) for name in free), strict=True)
         self.samples_ = np.clip(best + (x - best) * widen, lower, upper)
@@ -316,6 +336,7 @@ class AdhesionCurve:
                 "seed",
                 "common_sd",
                 "bounds",
+                "common_slip_sd",
             )
         }
         return AdhesionCurve(**{**same, **changes})

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.html import html_notes
-from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, Bins, BinSettings, bin_pairs
+from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, PULL, Bins, BinSettings, bin_pairs
 from terragrip.soil.choice import FORMS, LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.library import Soil, SoilLibrary
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
+BIASED = 0.1
+"""Relative shift of a curve by the noise of slip from which a fit by slip is a hint only."""
 APART = 0.03
 """Relative difference of the scale by pull from that by slip beyond which it is reported."""
 FALL = 0.05
 """Share of its top by which a curve must come down within the bins to make sorting by pull unfit."""
-DEFAULT = BinSettings(by=BY_PULL)
-"""How a campaign's pairs become bins."""
 
 
 @dataclass(frozen=True)
@@ -144,16 +144,20 @@ def learn_soils(
     wheels: int = 4,
     source: str = "",
     common_sd: float = 0.0,
+    common_slip_sd: float = 0.0,
 ) -> Campaign:
     """Fit a curve to each soil of the pairs; compare forms, correct for slip noise, propose what to drive next.
 
     `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's shape on bins by pull). `bins` by soil; default the
     curve's, on grass the paper's range up to 40 %. Bins by slip replace bins by pull where adhesion falls within the bins (beyond the
     maximum one pull has two slips) or too few bins are filled; a note says so. `mass` [kg] gives the pulls of
-    the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals.
+    the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals, and so does
+    `common_slip_sd`, the SD of slip's.
     Raises InputError if no pair is labelled.
     """
-    template = (curve or AdhesionCurve(bins=DEFAULT)).unfitted(common_sd=common_sd)
+    template = (curve or AdhesionCurve(bins=PULL)).unfitted(
+        common_sd=common_sd, common_slip_sd=common_slip_sd
+    )
     special = bins
     if special is None:
         special = {name: replace(template.bins, upper=one.upper) for name, one in PAPER_BINS.items()}
@@ -169,7 +173,13 @@ def learn_soils(
         settings = special.get(name, template.bins)
         try:
             learned = _learn(
-                name, parts, template.unfitted(bins=settings), mass, sample_period, wheels, source
+                name,
+                parts,
+                template.unfitted(bins=settings),
+                mass,
+                sample_period,
+                wheels,
+                source,
             )
         except InputError as error:
             missed[name] = str(error)
@@ -236,7 +246,7 @@ def _learn(
     wheels: int,
     source: str,
 ) -> LearnedSoil:
-    sorted_by_slip = bin_parts(parts, replace(template.bins, by=BY_SLIP))
+    sorted_by_slip = bin_parts(parts, template.bins.papers())
     verdict = _compared(sorted_by_slip)
     curve, by_slip = _fits(parts, template, sorted_by_slip, verdict)
     if curve is not by_slip:
@@ -246,6 +256,13 @@ def _learn(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
             "they do not cover the differences between runs."
         )
+    corrected = _of_noise(parts, curve) if np.isfinite(_joined(parts, "slip_std")).any() else None
+    if curve.bins_.settings.by == BY_SLIP and corrected is not None and corrected.moved > BIASED:
+        sentence = (
+            f"Sorted by slip, its noise moves the curve by {corrected.moved:.0%}, so the data do not fix it."
+        )
+        curve.identifiability_ = replace(curve.identifiability_, identifiable=False, sentence=sentence)
+        curve.notes_.append(sentence)
     resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
     if by_slip is not curve:
@@ -253,9 +270,7 @@ def _learn(
         kept = ("parameters", "interval", "r2", "nrmse", "bins", "settings", "band")
         shown = {key: papers[key] for key in kept if key in papers}
         soil = replace(soil, fit={**soil.fit, "by_slip": shown})
-    corrected = None
-    if np.isfinite(_joined(parts, "slip_std")).any():
-        corrected = _of_noise(parts, curve)
+    if corrected is not None:
         shown = {
             "plain": dict(corrected.plain),
             "corrected": dict(corrected.corrected),
@@ -274,19 +289,26 @@ def _fits(
 
     Raises InputError with too few slips, or no fit.
     """
+    why = "the curve falls within the bins, so that one pull has two slips"
+    if template.bins.by == BY_PULL and not _falls(sorted_by_slip, verdict):
+        try:
+            curve = explaining(template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins))))
+        except InputError as error:
+            why = error.problem
+        else:
+            return curve, _beside(curve, sorted_by_slip)
     paper = template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip)
     if template.bins.by == BY_PULL:
-        if _falls(sorted_by_slip, verdict):
-            why = "the curve falls within the bins, so that one pull has two slips"
-        else:
-            try:
-                return explaining(
-                    template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins)))
-                ), paper
-            except InputError as error:
-                why = error.problem
         paper.notes_.append(f"Sorted by slip, not by pull: {why}.")
     return explaining(paper), paper
+
+
+def _beside(curve: AdhesionCurve, sorted_by_slip: Bins) -> AdhesionCurve:
+    """The paper's fit beside a curve by pull; the curve itself where the drives reached too little of the paper's slips."""
+    try:
+        return curve.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip)
+    except InputError:
+        return curve
 
 
 def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:

@@ -52,7 +52,7 @@ class Soil:
     ) -> Soil:
         """A soil from a fitted curve."""
         whole = curve.to_dict()
-        kept = ("free", "settings", "clusters", "identifiability", "notes", "band")
+        kept = ("free", "settings", "clusters", "common_slip_sd", "identifiability", "notes", "band")
         rest: dict[str, Any] = {k: whole[k] for k in kept if k in whole}
         used = curve.bins_.used
         weight = curve.bins_.count[used]

@@ -34,6 +34,13 @@ class SlipNoise:
     matters: bool
     sentence: str
 
+    @property
+    def moved(self) -> float:
+        """The largest relative shift of a free parameter."""
+        return max(
+            abs(self.corrected[name] - plain) / max(abs(plain), 1e-9) for name, plain in self.plain.items()
+        )
+
 
 def correct_slip_noise(
     curve: AdhesionCurve,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,10 +11,10 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.bins import BY_SLIP, BinSettings
+from terragrip.soil.bins import PULL, BinSettings, chosen_bins
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.learn import DEFAULT, LearnedSoil, bin_parts
+from terragrip.soil.learn import LearnedSoil, bin_parts
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here, Studio
@@ -33,8 +32,8 @@ SLIPS = np.linspace(-1.0, 1.0, 401)
 class BinChoice(BaseModel):
     """Slip bins, as fractions; by the vehicle's pull unless stated otherwise, as `terragrip soils` has them."""
 
-    width: float = Field(0.01, gt=0, le=0.5)
-    lower: float = Field(0.05, ge=-1, le=1)
+    width: float | None = Field(None, gt=0, le=0.5)
+    lower: float | None = Field(None, ge=-1, le=1)
     upper: float = Field(0.60, ge=-1, le=1)
     minimum: int = Field(10, ge=1)
     by: Literal["pull", "slip"] = "pull"
@@ -42,7 +41,7 @@ class BinChoice(BaseModel):
     def settings(self) -> BinSettings:
         """As the fit takes them; InputError if they hold no bin."""
         try:
-            return BinSettings(self.width, self.lower, self.upper, self.minimum, self.by)
+            return chosen_bins(self.by, self.width, self.lower, self.upper, minimum=self.minimum)
         except ValueError as error:
             raise InputError(str(error), hint="widen the range") from None
 
@@ -219,7 +218,7 @@ def _unfitted(wanted: FitRequest, bins: BinSettings) -> AdhesionCurve:
 
 def _learned(studio: Studio, target: Path, wanted: FitRequest) -> LearnedSoil:
     """One soil of a file of estimates as `terragrip soils` learns it; raises InputError where it cannot be fitted."""
-    bins = DEFAULT if wanted.bins is None else wanted.bins.settings()
+    bins = PULL if wanted.bins is None else wanted.bins.settings()
     gathered = _gathered(studio, target, wanted.soil or "")
     name = gathered.pairs[0].soil
     campaign = gathered.learn(_unfitted(wanted, bins), None if wanted.bins is None else {})
@@ -263,7 +262,7 @@ def _shown(name: str, studio: Studio, target: Path, by: Literal["pull", "slip"])
     try:
         bins, note = _learned(studio, target, wanted).curve.bins_, ""
     except InputError as error:
-        bins, note = bin_parts(parts, replace(DEFAULT, by=BY_SLIP)), error.problem
+        bins, note = bin_parts(parts, PULL.papers()), error.problem
     slip, adhesion = (np.concatenate([getattr(part, key) for part in parts]) for key in ("slip", "adhesion"))
     step = max(len(slip) // SHOWN, 1)
     points = {"slip": slip[::step].round(5).tolist(), "adhesion": adhesion[::step].round(5).tolist()}
