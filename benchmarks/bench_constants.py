@@ -12,7 +12,8 @@ of slip from speeds alone are tried on the same logs without torques. --write pu
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -155,15 +156,25 @@ def changed(made: Callable[..., Any], change: Callable[[Any], None]) -> Callable
     return remade
 
 
-def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Figures:
-    """All recordings with the settings changed."""
-
+@contextmanager
+def changed_settings(change: Callable[[Any], None]) -> Iterator[None]:
+    """Within it every estimate is made by settings changed so."""
     usual = [getattr(holder, name) for holder, name in SETTINGS]
     for (holder, name), made in zip(SETTINGS, usual, strict=True):
         setattr(holder, name, changed(made, change))
+    try:
+        yield
+    finally:
+        for (holder, name), made in zip(SETTINGS, usual, strict=True):
+            setattr(holder, name, made)
+
+
+def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Figures:
+    """All recordings with the settings changed."""
     r2, nis, score = [], [], []
     for result in drawn:
-        estimates = estimate(result.recording, result.vehicle)
+        with changed_settings(change):
+            estimates = estimate(result.recording, result.vehicle)
         wheels = driven_wheels(result)
         measured = np.isfinite(result.recording[f"wheel_speed_{wheels[0]}"])
         rows = moving_rows(result) & measured
@@ -177,8 +188,6 @@ def figures(drawn: list[SimulationResult], change: Callable[[Any], None]) -> Fig
         score.append([held.score[name] for name in SCORED])
         taken = (estimates["channels"] > 0) & ~np.isin(estimates.event_codes, AT_REST)
         nis.append(float(estimates["nis"][taken].sum() / estimates["channels"][taken].sum()))
-    for (holder, name), made in zip(SETTINGS, usual, strict=True):
-        setattr(holder, name, made)
     return Figures(np.array(r2), np.array(nis), np.array(score))
 
 

@@ -157,12 +157,16 @@ def score(job: tuple[str, Kind, int, str, float], speeds_alone: bool = False) ->
     except (InputError, RuntimeError) as error:  # a simulation that diverges
         print(f"left out: {kind} {seed} {task}: {error}", file=sys.stderr)
         return Tally()
-    recording = result.recording
     left_out = ("drawbar_force", "drive_torque") if speeds_alone else ("drawbar_force",)
+    recording = without(result.recording, left_out)
+    return judge(course_of(result, task == "digging"), *starts(recording, result.vehicle))
+
+
+def without(recording: Recording, left_out: tuple[str, ...] = ("drawbar_force",)) -> Recording:
+    """The recording as logged without these channels."""
     channels = {name: x for name, x in recording.channels.items() if not name.startswith(left_out)}
     rows = np.logical_or.reduce([np.isfinite(values) for values in channels.values()])
-    seen = type(recording)(recording.time, channels, source=recording.source).select(rows)
-    return judge(course_of(result, task == "digging"), *starts(seen, result.vehicle))
+    return Recording(recording.time, channels, source=recording.source).select(rows)
 
 
 def starts(recording: Recording, vehicle: Vehicle) -> tuple[list[float], list[float]]:
@@ -173,14 +177,22 @@ def starts(recording: Recording, vehicle: Vehicle) -> tuple[list[float], list[fl
 
 
 def score_snow() -> Tally:
-    """As many made-up runs as were measured, and two hours of healthy snow."""
     tally, vehicle = Tally(), snow_runs.rover()
+    for recording, course in snow_drives():
+        tally.add(judge(course, *starts(recording, vehicle)))
+    return tally
+
+
+def snow_drives() -> Iterator[tuple[Recording, Course]]:
+    """As many made-up runs as were measured, and two hours of healthy snow."""
+    length = float(snow_runs.rover().wheelbase or 0.0)
     made = [snow_runs.snow_run(seed) for seed in range(snow_runs.RUNS)]
     for run in made + [snow_runs.healthy_snow(seed) for seed in range(24)]:
-        end, length = float(run.time[-1]), float(vehicle.wheelbase or 0.0)
-        course = Course(run.begun, run.stop, end, run.command, run.time, run.distance, length)
-        tally.add(judge(course, *starts(run.recording, vehicle)))
-    return tally
+        end = float(run.time[-1])
+        yield (
+            run.recording,
+            Course(run.begun, run.stop, end, run.command, run.time, run.distance, length),
+        )
 
 
 def jobs(

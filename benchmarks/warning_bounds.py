@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from bench_warning import DOCUMENT, SLOW, Course, course_of, judge, starts
+from bench_warning import DOCUMENT, SLOW, Course, course_of, judge, starts, without
 from marked import put
-from terragrip.recording import Recording
 from terragrip.simulation import SimulationResult, families, simulate
 from terragrip.simulation.families import Kind
 
@@ -62,10 +61,7 @@ def drives(ground: str, count: int, seed: int, rate: float) -> Iterator[Simulati
 def stop_of(result: SimulationResult) -> Stop | None:
     """None where the machine does not stop."""
     course = course_of(result, digging=True)
-    recording = result.recording
-    channels = {k: v for k, v in recording.channels.items() if k != "drawbar_force"}
-    rows = np.logical_or.reduce([np.isfinite(values) for values in channels.values()])
-    tally = judge(course, *starts(Recording(recording.time, channels).select(rows), result.vehicle))
+    tally = judge(course, *starts(without(result.recording), result.vehicle))
     if not tally.stops:
         return None
     since = tuple(_since(result, course, level) for level in (0.2, 0.3))

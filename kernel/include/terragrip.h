@@ -293,16 +293,15 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot determine; 
 typedef struct { /* when the estimator warns of immobilization (see src/digging.c), and calls the vehicle stuck or pushed */
     tg_real pace;                   /* the unit of time, over sqrt(length/gravity) */
     tg_real memory;                 /* units of time, low-pass of the points' sum, the score */
-    tg_real usual;                  /* units of time over which what is usual is learned (slip: half and eight times as many, see src/digging.c) */
-    tg_real sure;                   /* SDs that are taken off slip where it has to be sure: to be high, and to be warned of, which it is */
-    tg_real ahead;                  /* where it passes this, and twice its usual, if it rises as much again in the next unit of time, */
+    tg_real usual;                  /* units of time over which what is usual is learned, */
+    tg_real soon;                   /* and within which more slip than usual is: soon, and forgotten late, so that work outlasts headlands */
+    tg_real ahead, beyond;          /* where sure slip passes the first, and the second times its usual, if it rises as much again in the next unit of time, */
     tg_real warn;                   /* and of a score above this; on until it is half of this */
     tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
-    tg_real rise;                   /* a point: rise of slip above its mean over a unit of time */
-    tg_real high_slip;              /* sure slip beyond which points are given, `most` at twice that */
-    tg_real leading;                /* a point: fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
-    tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
+    tg_real change;                 /* a point: rise of slip above its mean over a unit of time, or fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
     tg_real command;                /* a point off: gain of rim or ground speed over that mean, or twice as much loss of rim speed; log */
+    tg_real high_slip;              /* sure slip, which is slip less its SD, beyond which points are given, `most` at twice that */
+    tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
     tg_real stuck_duration;         /* s that the ground speed must stay below `stuck_travel` */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */
     tg_real push, thrust;           /* push from behind, and thrust meanwhile, over the weight */

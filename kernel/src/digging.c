@@ -7,9 +7,6 @@
 #define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
 #define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
-#define TG_LEARNED ((tg_real)0.5) /* of `usual`: more slip than usual is learned within it, */
-#define TG_FORGOTTEN 8 /* and less within so many of it */
-#define TG_BEYOND 2 /* usual slips that slip has to pass */
 
 /* Exact also where intervals are longer than tau. */
 static tg_real low_pass(tg_real mean, tg_real dt, tg_real tau, tg_real x)
@@ -66,10 +63,10 @@ static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
 /* Where a machine works at much slip, that is soon usual, and stays so over its turns and ways between. */
 static void learn_usual(const tg_watch_settings *s, tg_real pace, tg_real since, tgi_digging *d)
 {
-    const tg_real slip = bounded(d->now[TGI_SLIP], -1, s->high_slip), longest = s->usual * pace;
+    const tg_real slip = bounded(d->now[TGI_SLIP], -1, s->high_slip);
     const tg_real usual[2] = {slip, d->now[TGI_BALANCE]};
-    const tg_real memory[2] = {longest * (slip > d->usual[0] ? TG_LEARNED : TG_FORGOTTEN), longest};
-    for (int32_t k = 0; k < 2; k++) d->usual[k] = d->age > 0 ? low_pass(d->usual[k], since, bounded(d->age, 0, memory[k]), usual[k]) : usual[k];
+    const tg_real memory[2] = {slip > d->usual[0] ? s->soon : s->usual, s->usual};
+    for (int32_t k = 0; k < 2; k++) d->usual[k] = d->age > 0 ? low_pass(d->usual[k], since, bounded(d->age, 0, memory[k] * pace), usual[k]) : usual[k];
 }
 
 /* Add a row to the interval, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
@@ -118,22 +115,22 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     const tg_real *const now = d->now, *const mean = d->mean;
     tg_real since;
     if (!add_row(e, time, row, &since)) return 0;
-    const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - s->sure * deviation, rise = slip - mean[TGI_SLIP];
+    const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - deviation, rise = slip - mean[TGI_SLIP];
     const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
     /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that
      * digs in. Rims are known well where slip is not; what the vehicle gains has slip's SD, which is that of the speeds, relative. */
     const tg_real rims = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command, command = tgi_max(rims, gain / one_point(s->command, deviation));
     const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
     const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];
-    d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->rise, deviation), -s->most, s->most);
+    d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->change, deviation), -s->most, s->most);
     d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
-    d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->leading, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
+    d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->change, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, now[TGI_RESISTANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_COMMAND] = -bounded(command, 0, 2 * s->most);
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);
-    d->slips = sure + rise > tgi_max(s->ahead, TG_BEYOND * d->usual[0]);
+    d->slips = sure + rise > tgi_max(s->ahead, s->beyond * d->usual[0]);
     return 1;
 }
 

@@ -7,16 +7,16 @@ static tg_watch_settings default_watch(void)
     tg_watch_settings w;
     w.pace = 4;
     w.memory = (tg_real)0.35;
-    w.usual = 12;
-    w.sure = 1;
+    w.usual = 96;
+    w.soon = 6;
     w.ahead = (tg_real)0.21;
+    w.beyond = 2;
     w.warn = (tg_real)3.6;
     w.most = 3;
-    w.rise = (tg_real)0.035;
-    w.high_slip = (tg_real)0.28;
-    w.leading = (tg_real)0.06;
-    w.resistance = (tg_real)0.006;
+    w.change = (tg_real)0.04;
     w.command = (tg_real)0.03;
+    w.high_slip = (tg_real)0.28;
+    w.resistance = (tg_real)0.006;
     w.stuck_duration = (tg_real)0.5;
     w.stuck_travel = (tg_real)0.1;
     w.free_travel = (tg_real)0.4;
@@ -173,11 +173,12 @@ static tg_status check_numbers(const tg_settings *s)
                                u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias, u->mass, u->hitch_load_gain,
                                u->hitch_load_offset, s->ground_speed_delay, s->payload_height,
                                s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.sure, s->watch.ahead, s->watch.most, s->watch.high_slip,
+                               s->hitch_height, s->watch.ahead, s->watch.beyond, s->watch.most, s->watch.high_slip,
                                s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
                                s->watch.push_duration};
-    const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.rise, s->watch.leading, s->watch.resistance,
-                                s->watch.command, s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
+    const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.soon, s->watch.change, s->watch.command,
+                                s->watch.resistance,
+                                s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
                                 s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
     const tg_real *const tuned = (const tg_real *)&s->tuned; /* all of them reals */
     for (size_t k = 0; k < sizeof s->tuned / sizeof *tuned; k++)

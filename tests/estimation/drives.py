@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.estimation import Estimates
 from terragrip.physics.loads import GRAVITY, axle_loads
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -121,3 +122,27 @@ def with_values(recording: Recording, channel: str, rows: Any, value: Any) -> Re
     changed = recording.channels[channel].copy()
     changed[rows] = value
     return recording.with_channels(**{channel: changed})
+
+
+def steady_rims(
+    slip: Any,
+    seconds: float,
+    rate: float = 100.0,
+    *,
+    rim: Any = lambda t: 0.6 + 0.0 * t,
+    noise: float = 0.3,
+    pull_known: bool = False,
+    **more: Any,
+) -> Recording:
+    """A drive whose rims' speed [m/s] is chosen, not the vehicle's, without a drawbar cell unless ``pull_known``."""
+    log = drive(seconds, rate=rate, noise=noise, slip=slip, speed=lambda t: rim(t) * (1 - slip(t)), **more)
+    channels = dict(log.recording.channels)
+    if not pull_known:
+        del channels["drawbar_force"]
+    return Recording(log.recording.time, channels)
+
+
+def begins(estimates: Estimates, kind: str) -> Floats:
+    """When the spells of an event begin [s]."""
+    has = estimates["event"] == kind
+    return estimates.time[has & ~np.r_[False, has[:-1]]]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drives import RADIUS, drive, robot
-from kernel_twin.immobilization import pace
+from drives import GRAVITY, RADIUS, begins, robot, steady_rims
 from terragrip.estimation import Estimates, estimate
 from terragrip.estimation.settings import watch_limits
 from terragrip.recording import Recording
+from terragrip.vehicle import Vehicle
 
 WORK, TURN, DIGS, STOPS = 10.0, 6.0, 115.0, 119.0
 
@@ -27,14 +27,8 @@ def ploughing(t: Any) -> Any:
 
 def unseen_pull(slip: Any, seconds: float, rate: float, since: float = 0.0) -> Estimates:
     """Estimates of a drive with steady rims and no drawbar cell, whose clock begins at ``since`` [s]."""
-    log = drive(seconds, rate=rate, noise=0.3, slip=slip, speed=lambda t: 0.6 * (1 - slip(t))).recording
-    channels = {name: x for name, x in log.channels.items() if name != "drawbar_force"}
-    return estimate(Recording(log.time + since, channels), robot())
-
-
-def begins(estimates: Estimates, kind: str) -> Any:
-    has = estimates["event"] == kind
-    return estimates.time[has & ~np.r_[False, has[:-1]]]
+    log = steady_rims(slip, seconds, rate)
+    return estimate(Recording(log.time + since, log.channels), robot())
 
 
 def test_the_slip_at_which_a_machine_works_warns_no_more_and_digging_in_from_it_does() -> None:
@@ -63,13 +57,29 @@ def test_more_slip_is_soon_usual_and_less_is_not(
     before: float, after: float, seconds: float, memory: float
 ) -> None:
     """As docs/events.md has it, in units of time, and never faster than within the age of what was seen."""
-    unit = pace(robot(), watch_limits(RADIUS))
+    unit = watch_limits(RADIUS)["pace"] * np.sqrt(0.638 / GRAVITY)
     change = 130.0
     usual = unseen_pull(lambda t: np.where(t < change, before, after), change + seconds, 10.0)[
         "warning_usual_slip"
     ]
     expected = after + (before - after) * np.exp(-seconds / (memory * unit))
     assert usual[-1] == pytest.approx(expected, abs=0.02)
+
+
+def test_the_unit_of_time_of_a_machine_of_one_axle_is_that_of_three_wheel_radii() -> None:
+    """Speeds alone; the slip's usual as above, by the unit."""
+    radius, change, seconds = 0.3, 130.0, 3.0
+    time = np.arange(0, change + seconds, 0.1)
+    noise = np.random.default_rng(0).normal(0, 0.003, (3, len(time)))
+    slip = np.where(time < change, 0.05, 0.2)
+    channels = {"ground_speed": 1 - slip + noise[0]}
+    channels |= {f"wheel_speed_{w}": (1 + more) / radius for w, more in zip("lr", noise[1:], strict=True)}
+    axles = {"only": {"mass": 60.0, "wheels": ["l", "r"]}}
+    machine = Vehicle.from_dict({"mass": 60.0, "axles": axles, "wheel": {"radius": radius, "inertia": 0.1}})
+    usual = estimate(Recording(time, channels), machine)["warning_usual_slip"]
+    limits = watch_limits(radius)
+    memory = limits["soon"] * limits["pace"] * np.sqrt(3 * radius / GRAVITY)
+    assert usual[-1] == pytest.approx(0.2 - 0.15 * np.exp(-seconds / memory), abs=0.01)
 
 
 def test_stuck_comes_half_a_second_after_the_last_sample_that_shows_it_free() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from drives import MASS, RADIUS, drive, robot
-from kernel_twin.immobilization import _ends, pace, side_of_wheels
 from terragrip._kernel import lib
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates, estimate, estimated, methods
@@ -25,11 +24,9 @@ from terragrip.estimation.export.rows_as_json import json_rows
 from terragrip.estimation.forward import flag_before_gaps, table_of
 from terragrip.estimation.provenance import about_recording
 from terragrip.estimation.rims import Rim
-from terragrip.estimation.settings import watch_limits
 from terragrip.estimation.summary import Tally
 from terragrip.estimation.summary_text import _short, _time
 from terragrip.recording import LogBlocks, Recording
-from terragrip.vehicle import Vehicle
 
 GAP, STUCK = EVENTS.index("gap"), EVENTS.index("stuck")
 
@@ -258,37 +255,6 @@ def test_the_row_before_a_gap_is_flagged_across_blocks_too(codes: list[int], fla
     flag_before_gaps(event, before)
     assert event.tolist() == flagged
     assert before.tolist() == [0, 0, GAP if codes[0] == GAP else 0]
-
-
-# --- machines
-
-
-def machine(**more: Any) -> Vehicle:
-    one = {
-        "mass": 60,
-        "axles": {"a": {"mass": 60, "wheels": ["l", "r"]}},
-        "wheel": {"radius": 0.3, "inertia": 0.1},
-    }
-    return Vehicle.from_dict({**one, **more})
-
-
-def test_the_watch_takes_the_time_that_a_machine_of_that_length_does() -> None:
-    limits = {**watch_limits(0.3), "pace": 2.0}
-    assert pace(machine(), limits) == pytest.approx(2.0 * np.sqrt(0.9 / 9.80665))  # of one axle: three radii
-    assert pace(robot(), limits) == pytest.approx(2.0 * np.sqrt(0.638 / 9.80665))
-
-
-def test_sides_and_ends_of_wheels() -> None:
-    assert side_of_wheels(robot()).tolist() == [-1.0, 1.0, -1.0, 1.0]
-    three = machine(axles={"a": {"mass": 60, "wheels": ["l", "m", "r"]}})
-    assert side_of_wheels(three).tolist() == [-1.0, 0.0, 1.0]
-    driven = np.ones(4, dtype=bool)
-    assert [end.tolist() for end in _ends(robot(), driven)] == [
-        [True, True, False, False],
-        [False, False, True, True],
-    ]
-    rear = np.array([False, False, True, True])
-    assert [end.tolist() for end in _ends(robot(), rear)] == [rear.tolist()] * 2
 
 
 def test_a_vehicle_that_the_kernel_refuses_is_refused_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,7 +70,8 @@ def _immobilization(estimates: Estimates, rows: Ints) -> str:
     known = {sign: f"warning_{sign}" for sign in SIGNS if f"warning_{sign}" in estimates}
     warns = limits["warn"] * (1.0 if estimates.has_adhesion else WITHOUT_TORQUE)
     points = dict.fromkeys(SIGNS, 0.0) | {sign: float(estimates[name][row]) for sign, name in known.items()}
-    change = {sign: points[sign] * limits[sign] for sign in ("rise", "leading", "resistance")}
+    one_point = {"rise": limits["change"], "leading": limits["change"], "resistance": limits["resistance"]}
+    change = {sign: points[sign] * least for sign, least in one_point.items()}
     most = max(points.values())
     sentence = {
         "rise": f"slip of the worst wheels rose by {change['rise']:.0%} or more",

@@ -1,7 +1,7 @@
 """The kernel in plain NumPy, written apart from it: the oracle that its tests compare it with.
 
 The filters, in any precision (`filters`, `unscented`, `adaptation`, `bank`, `smoother`), know nothing of machines; the machine's model,
-the filter with the kernel's arguments, its supervisor, the considered constants, slip from speeds alone and the warning of immobilization
+the filter with the kernel's arguments, its supervisor, the considered constants and slip from speeds alone
 are put together from them.
 """
 

@@ -1,0 +1,121 @@
+"""Each sign of the warning of immobilization on a drive that shows it: its points as docs/events.md defines them, in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drives import GRAVITY, RADIUS, Drive, begins, drive, robot, steady_rims
+from terragrip.estimation import Estimates, estimate
+from terragrip.estimation.engine import SIGNS
+from terragrip.estimation.noise import DELAY
+from terragrip.estimation.settings import watch_limits
+from terragrip.recording import Recording
+
+LIMITS = watch_limits(RADIUS)
+UNIT = LIMITS["pace"] * np.sqrt(0.638 / GRAVITY)
+LAG = 0.9 * UNIT
+"""s by which a mean over the unit of time is behind one over a tenth of it, where something rises steadily."""
+
+
+def exactly(log: Recording | Drive) -> Estimates:
+    """Without the delay's part of the SDs, which the warning leaves out."""
+    return estimate(log if isinstance(log, Recording) else log.recording, robot(), sensors={DELAY: 0.0})
+
+
+def later(start: float, rate: float) -> Any:
+    """What rises from an instant on."""
+    return lambda t: rate * np.clip(t - start, 0, None)
+
+
+def deviation_before(table: Estimates, time: float) -> float:
+    """SD of slip before it rises: what the filter has not followed yet adds to it later, which the warning leaves out."""
+    return float(table["slip_fl_std"][np.searchsorted(table.time, time) - 1])
+
+
+def test_rising_slip() -> None:
+    more = later(20.0, 0.02)
+    table = exactly(steady_rims(lambda t: 0.05 + more(t), 26.0, noise=0.01, pull_known=True))
+    expected = 0.02 * LAG / np.hypot(LIMITS["change"], deviation_before(table, 20.0))
+    assert table["warning_rise"][-1] == pytest.approx(expected, rel=0.1)
+
+
+def test_high_slip_less_its_deviation() -> None:
+    table = exactly(steady_rims(lambda t: 0.4 + 0 * t, 20.0, noise=0.0, pull_known=True))
+    expected = LIMITS["most"] * ((0.4 - table["slip_fl_std"][-1]) / LIMITS["high_slip"] - 1)
+    assert table["warning_high_slip"][-1] == pytest.approx(expected, rel=0.05)
+    points = sum(float(table[f"warning_{sign}"][-1]) for sign in SIGNS)
+    assert table["warning"][-1] == pytest.approx(points, abs=0.01)  # what stays is its own low-pass
+
+
+def test_rising_resistance() -> None:
+    more = later(20.0, 0.005)
+    log = drive(26.0, noise=0.0, imu=True, slip=lambda t: 0.1 + 0 * t, speed=lambda t: 0.5 + 0 * t,
+                resistance=lambda t: 0.08 + more(t))  # fmt: skip
+    table = exactly(log)
+    expected = 0.005 * LAG / np.hypot(LIMITS["resistance"], table["soil_resistance_std"][-1])
+    assert table["warning_resistance"][-1] == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize(("gain", "off"), [(0.03, 0.03), (-0.06, 0.03), (0.5, np.inf)])
+def test_a_command_takes_points_off_and_a_slower_one_half_as_many(gain: float, off: float) -> None:
+    """Rims and vehicle together by so much a second, relative."""
+    table = exactly(
+        drive(
+            22.5,
+            noise=0.0,
+            imu=True,
+            slip=lambda t: 0.1 + 0 * t,
+            speed=lambda t: 0.5 * np.exp(gain * np.clip(t - 18, 0, None)),
+        )
+    )
+    expected = min(off * LAG / LIMITS["command"], 2 * LIMITS["most"])
+    assert table["warning_command"][-1] == pytest.approx(-expected, rel=0.06)
+
+
+def balance(table: Estimates, row: int) -> Any:
+    """Of the leading wheels' adhesion against the trailing ones', and its SD by finite differences."""
+    front, rear = (0.5 * (table[f"adhesion_{a}l"][row] + table[f"adhesion_{a}r"][row]) for a in "fr")
+    spread = np.sqrt(sum(table[f"adhesion_{w}_std"][row] ** 2 for w in ("fl", "fr", "rl", "rr")) / 8)
+
+    def share(a: float, b: float) -> float:
+        return (a - b) / (a + b + 0.1)
+
+    by_front, by_rear = (
+        share(front + 1e-6, rear) - share(front, rear),
+        share(front, rear + 1e-6) - share(front, rear),
+    )
+    return share(front, rear), np.hypot(by_front, by_rear) / 1e-6 * spread
+
+
+def shifted(log: Recording, share: Any) -> Recording:
+    """So much of the front wheels' torque moves to the rear ones."""
+    torque = {w: log[f"drive_torque_{w}"] for w in ("fl", "fr", "rl", "rr")}
+    for front, rear in (("fl", "rl"), ("fr", "rr")):
+        moved = share(log.time) * torque[front]
+        torque[front], torque[rear] = torque[front] - moved, torque[rear] + moved
+    return log.with_channels(**{f"drive_torque_{w}": x for w, x in torque.items()})
+
+
+def test_leading_wheels_that_lose_adhesion_to_the_trailing_ones() -> None:
+    level = steady_rims(lambda t: 0.1 + 0 * t, 22.0, noise=0.0, pull_known=True)
+    table = exactly(shifted(level, lambda t: 0.1 * np.clip(t - 20, 0, 1)))
+    before, after = (int(np.searchsorted(table.time, t)) for t in (19.9, 21.99))
+    (usual, _), (now, deviation) = balance(table, before), balance(table, after)
+    expected = (usual - now) / np.hypot(LIMITS["change"], deviation)
+    assert table["warning_leading"][after] == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize("work", [0.15, 0.17])
+def test_slip_that_rises_slowly_warns_once_it_will_surely_be_far_beyond_its_usual(work: float) -> None:
+    """From the slip at which the machine works, in 8 s to .7 more: by the columns, the row in which that is so."""
+    rises = later(20.0, 0.7 / 8)
+    table = exactly(steady_rims(lambda t: work + rises(t), 24.0, 20.0))
+    slip, deviation = table["slip_fl"], deviation_before(table, 20.0)
+    rise = table["warning_rise"] * np.hypot(LIMITS["change"], deviation)
+    least = np.maximum(LIMITS["ahead"], LIMITS["beyond"] * table["warning_usual_slip"])
+    far = (slip - deviation + rise > least) & (table.time > 20)
+    assert (table["warning"][far] > LIMITS["warn"]).all()
+    assert begins(table, "immobilization")[-1] == pytest.approx(table.time[np.argmax(far)], abs=0.2 * UNIT)
