@@ -26,7 +26,7 @@ from marked import put
 from terragrip.physics.adhesion import CURVES
 from terragrip.report.campaign import estimate_campaign
 from terragrip.report.campaign_soils import fits_of_truth, soils_of_scenario
-from terragrip.soil.bins import BY_PULL, BY_SLIP, Bins, BinSettings, bin_pairs
+from terragrip.soil.bins import BY_PULL, Bins, BinSettings, bin_pairs
 from terragrip.soil.fit import FREE, AdhesionCurve
 
 SEEDS = tuple(range(3000, 3008))
@@ -74,14 +74,14 @@ def campaign_scores(seed: int) -> list[Score]:
         campaign = estimate_campaign(Path(folder), seed, 2, None, None)
     pairs = [part for run in campaign.runs for part in run.true_pairs]
     truth = soils_of_scenario("multi2", pairs)
-    of_truth = [fits_of_truth(campaign.soils, pairs, by) for by in (BY_PULL, BY_SLIP)]
+    of_truth = [fits_of_truth(campaign.soils, pairs, by_slip) for by_slip in (False, True)]
     scores = []
     for name, learned in campaign.soils.soils.items():
         a, noise = truth[name].parameters["a"], learned.slip_noise
         assert noise is not None
         fits = (learned.curve, learned.by_slip, *(one[name] for one in of_truth))
         by_pull, by_slip, true_by_pull, true_by_slip = (Fit.of(curve, a) for curve in fits)
-        plain, kept = noise.plain["a"] / a - 1, learned.curve is not learned.by_slip
+        plain, kept = noise.plain["a"] / a - 1, learned.curve.bins_.settings.by == BY_PULL
         scores.append(Score(name, by_pull, by_slip, true_by_pull, true_by_slip, plain, kept))
     return scores
 

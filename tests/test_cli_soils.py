@@ -323,3 +323,18 @@ def test_data_do_not_fix_a_curve_that_explains_little_of_them(
     assert any("explains little of the bins" in note for note in result["notes"])
     output = capsys.readouterr().out
     assert f"no (R2 {result['r2']:.2f})" in output
+
+
+def test_digitised_points_begin_where_bins_by_slip_do(tmp_path: Path) -> None:
+    """They have no pull, so the usual way does not lower their first slip; --lower does."""
+    slip = np.linspace(0.01, 0.5, 50)
+    mu = CURVES["exponential"].value(slip, {"a": 0.9})
+    rows = "".join(f"{s},{m}\n" for s, m in zip(slip, mu, strict=True))
+    (tmp_path / "points.csv").write_text("slip,mu\n" + rows)
+    for options, lowest in (((), 0.05), (("--lower", 0.02), 0.02)):
+        soils = learn(
+            tmp_path / "soils.json", tmp_path / "points.csv", "--soil", "field", *options, "--quiet"
+        )
+        settings = soils["soils"]["field"]["settings"]
+        assert settings["lower"] == lowest
+        assert settings["by"] == "slip"

@@ -254,3 +254,28 @@ def test_sorted_by_slip_a_curve_that_noise_bends_is_not_called_fixed():
     assert learned.soil.parameters["a"] < 0.85
     assert not learned.curve.identifiability_.identifiable
     assert any("noise moves the curve" in note for note in learned.curve.notes_)
+
+
+def test_slips_that_end_below_the_papers_first_bin_are_sorted_by_slip_in_the_bins_of_the_pull():
+    """A range up to 5 % ended in a traceback: the paper's bins hold none of it."""
+    bins = BinSettings(by="pull", lower=0.005, width=0.005, upper=0.05)
+    assert bins.papers() == BinSettings(by="slip", lower=0.005, width=0.005, upper=0.05)
+    assert learn_soils(light_work(), AdhesionCurve(bins=bins)).soils["field"].curve.bins_.settings == bins
+
+
+def test_an_error_of_zero_slip_is_stored_only_with_the_interval_that_holds_it():
+    """Advice takes the stored error off its own: without an interval it came out too narrow."""
+    few = learn_soils(
+        light_work(), AdhesionCurve(bins=BinSettings(by="pull"), bootstrap=0), common_slip_sd=0.01
+    )
+    assert "common_slip_sd" not in few.soils["field"].soil.to_dict()
+    many = learn_soils(light_work(), common_slip_sd=0.01)
+    assert many.soils["field"].soil.to_dict()["common_slip_sd"] == 0.01
+
+
+def test_noise_that_moves_an_intercept_near_zero_moves_no_curve():
+    """The relative shift of one small parameter took the badge."""
+    curve = AdhesionCurve(bins=BinSettings(by="slip"), intercept=True)
+    learned = learn_soils(light_work(top=0.5, noise=0.005), curve).soils["field"]
+    assert learned.slip_noise.moved < 0.02
+    assert learned.curve.identifiability_.identifiable

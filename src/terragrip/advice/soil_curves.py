@@ -63,7 +63,7 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     slip_sd = float(soil.fit.get("slip_noise", {}).get("slip_std", np.nan))
     if not np.isfinite(slip_sd):
         slip_sd = 0.0 if samples is None else float(np.median(samples.slip_std))
-    known = float(soil.fit.get("common_slip_sd", 0.0))  # in the soil's own interval
+    known = float(soil.fit.get("common_slip_sd") or 0.0)  # in the soil's own interval
     beyond = np.sqrt(max(lasting_sd(zero_slip_sd(vehicle), slip_sd) ** 2 - known**2, 0.0))
     error = beyond * rng.standard_normal((DRAWS + 1, 1))
     width[0], growth[0], shift[0], error[0] = 0.0, GROWTH[0], 0.0, 0.0

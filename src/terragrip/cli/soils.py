@@ -78,7 +78,7 @@ def command(
     depends on weak and strong spots; the paper's fit, sorted by slip, is given beside it.
     """
     from terragrip.errors import InputError
-    from terragrip.soil.bins import BinSettings, chosen_bins
+    from terragrip.soil.bins import BY_SLIP, BinSettings, chosen_bins
     from terragrip.soil.digitised import soils_of_points
     from terragrip.soil.estimates import soils_of
     from terragrip.soil.fit import FREE, AdhesionCurve
@@ -90,6 +90,7 @@ def command(
     other = SoilLibrary.load(compare) if compare else None
     try:
         bins = chosen_bins(by, width, lower, upper, minimum=minimum, metres=metres, runs=runs)
+        of_points = chosen_bins(BY_SLIP, width, lower, upper)  # which have no pull
     except ValueError as error:
         raise InputError(
             str(error), place="--width, --lower, --upper, --by, --metres, --runs", hint="choose other bins"
@@ -119,7 +120,7 @@ def command(
         if path.suffix.lower() == ".json":
             library = _joined(library, SoilLibrary.load(path), path)
         elif path.suffix.lower() == ".csv":
-            points = soils_of_points(path, curve, soil)
+            points = soils_of_points(path, curve.unfitted(bins=of_points), soil)
             words += [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
             words += [
                 f"{name}: {with_page(note)}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,13 +31,13 @@ def true_pairs(estimates: Estimates, result: SimulationResult, run: str) -> list
 
 
 def fits_of_truth(
-    campaign: Campaign, pairs: Sequence[RunPairs], by: str | None = None
+    campaign: Campaign, pairs: Sequence[RunPairs], by_slip: bool = False
 ) -> dict[str, AdhesionCurve]:
-    """The fit of each of the campaign's soils on true pairs, bins by the same settings (sorted `by` another quantity), no intervals."""
+    """The fit of each of the campaign's soils on true pairs, in the same bins, or in the paper's `by_slip`; no intervals."""
     result = {}
     for name, learned in campaign.soils.items():
         parts = [part for part in pairs if part.soil == name]
-        settings = learned.curve.bins if by is None else replace(learned.curve.bins, by=by)
+        settings = learned.curve.bins.papers() if by_slip else learned.curve.bins
         try:
             result[name] = learned.curve.unfitted(bootstrap=0).fit_bins(bin_parts(parts, settings))
         except (InputError, ValueError):  # too few bins: what the truth does not show is left out

@@ -21,6 +21,7 @@ from terragrip.report.style import (
     styled,
     to_svg,
 )
+from terragrip.soil.bins import BY_PULL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -161,22 +162,25 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
 def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
     """Draw one soil; the legend's entries by label."""
     named: dict[str, Any] = {}
-    paper, counts = shown.learned.by_slip, shown.learned.curve
-    named["bins by slip, mean ± SD"] = _draw_bins(plot, paper, "x", MUTED, 4)
-    if counts is not paper:
+    paper, counts = shown.by_slip, shown.learned.curve
+    by_pull = counts.bins_.settings.by == BY_PULL
+    sorted_by_slip = paper if by_pull else counts
+    if sorted_by_slip is not None:
+        named["bins by slip, mean ± SD"] = _draw_bins(plot, sorted_by_slip, "x", MUTED, 4)
+    if by_pull:
         named["bins by pull, mean ± SD"] = _draw_bins(plot, counts, "o", BLUE, 3.5)
     if shown.learned.curve.has_band:
         low, high = shown.learned.curve.band(SLIPS)
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
     lines: list[tuple[str, Floats | None, dict[str, Any]]] = [
         (
-            "fit to the bins" + (" by pull" if counts is not paper else ""),
+            "fit to the bins" + (" by pull" if by_pull else ""),
             counts.predict(SLIPS),
             {"color": BLUE, "linewidth": 1.8},
         ),
         (
             "fit by slip, the paper's way",
-            paper.predict(SLIPS) if counts is not paper else None,
+            None if paper is None else paper.predict(SLIPS),
             {"color": MUTED, "linewidth": 1.4, "linestyle": "--"},
         ),
         ("paper", _value(shown.paper), {"color": ORANGE, "linewidth": 1.4, "linestyle": "-."}),

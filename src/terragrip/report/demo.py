@@ -47,7 +47,6 @@ from terragrip.report.scores import (
     Comparison,
     find,
 )
-from terragrip.soil.bins import BY_SLIP
 
 SEED = 0
 """The campaign's seed, as `simulate_campaign` has it: with it the demo's numbers can be repeated."""
@@ -125,7 +124,7 @@ def _page(campaign: EstimatedCampaign, seed: int, seconds: float) -> Page:
         campaign.soils,
         truth=truth,
         true_pairs=fits_of_truth(campaign.soils, true_pairs),
-        true_by_slip=fits_of_truth(campaign.soils, true_pairs, BY_SLIP),
+        true_by_slip=fits_of_truth(campaign.soils, true_pairs, by_slip=True),
     )
     tire = campaign.vehicle.tire_rolling_resistance
     scales = {name: soil.parameters["a"] for name, soil in truth.items()}

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from terragrip.physics.adhesion import CURVES
 from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table, names, number, percent
-from terragrip.soil.bins import BY_PULL
+from terragrip.soil.bins import BY_PULL, BY_SLIP, BinSettings
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import Campaign
 from terragrip.soil.library import Soil
@@ -127,19 +127,27 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
 
 def _preparation(curves: Sequence[SoilCurves]) -> str:
     """How samples became bins."""
-    settings = curves[0].learned.curve.bins_.settings
-    sentence = (
-        f"Bins of {100 * settings.width:g} % slip from {100 * settings.lower:g} % to {percent(settings.upper, 0)}; "
-        "samples on a transition or under an event are left out."
-    )
-    if any(one.learned.curve.bins_.settings.by == BY_PULL for one in curves):
+    kinds = [one.learned.curve.bins_.settings for one in curves]
+    kinds += [one.by_slip.bins_.settings for one in curves if one.by_slip is not None]
+    by_pull, by_slip = (next((one for one in kinds if one.by == by), None) for by in (BY_PULL, BY_SLIP))
+    sentence = "Samples on a transition or under an event are left out."
+    if by_pull is not None:
         sentence += (
-            " By pull: each sample goes into the bin whose slip the mean curve gives for the vehicle's pull, so that a bin holds weak and "
-            f"strong ground alike; bins of less than {settings.metres:g} m or {settings.runs} runs are joined. Slips "
-            "beyond them are met where the ground gives way, not by a steady pull: there the curve is the prototype's shape, and the bins "
-            "by slip show what was met."
+            f" By pull, in bins of {_range(by_pull)}: each sample goes into the bin whose slip the mean curve gives for the pull, "
+            f"so that a bin holds weak and strong ground alike; bins of less than {by_pull.metres:g} m or {by_pull.runs} runs are joined. "
+            "Slips beyond them are met where the ground gives way, not by a steady pull: there the curve is the prototype's shape, and the "
+            "bins by slip show what was met."
         )
-    return f"{sentence} By slip, the paper's way: each sample by its own slip, at least {settings.minimum} samples a bin."
+    if by_slip is not None:
+        sentence += (
+            f" By slip, the paper's way, in bins of {_range(by_slip)}: each sample by its own slip, at least {by_slip.minimum} samples "
+            "a bin."
+        )
+    return sentence
+
+
+def _range(bins: BinSettings) -> str:
+    return f"{100 * bins.width:g} % slip from {100 * bins.lower:g} % to {100 * bins.upper:g} %"
 
 
 def _quality_table(curves: Sequence[SoilCurves]) -> Table:

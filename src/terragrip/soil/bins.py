@@ -64,12 +64,14 @@ class BinSettings:
         return np.asarray(self.lower + self.width * np.arange(count + 1), dtype=float)
 
     def papers(self) -> BinSettings:
-        """Of the paper's fit beside these bins: by slip, no narrower than the paper's, and from no lower, since noise sorts there."""
+        """Of the paper's fit beside these bins: by slip, no narrower than the paper's, and from no lower, since noise sorts there; as they
+        are where that leaves none."""
         if self.by == BY_SLIP:
             return self
-        return replace(
-            self, by=BY_SLIP, lower=max(self.lower, PAPER.lower), width=max(self.width, PAPER.width)
-        )
+        lower, width = max(self.lower, PAPER.lower), max(self.width, PAPER.width)
+        if self.upper - lower < width:
+            lower, width = self.lower, self.width
+        return replace(self, by=BY_SLIP, lower=lower, width=width)
 
     def to_dict(self) -> dict[str, float | str]:
         """The settings as plain numbers and words."""

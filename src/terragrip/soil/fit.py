@@ -90,7 +90,8 @@ class AdhesionCurve:
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of samples that are not independent.
 
-        Pairs are sorted by slip. Bins by pull need the pull: `pull_bins.bin_by_pull` and `fit_bins`.
+        Pairs are sorted by slip; where the settings are by pull, into the paper's bins beside them (`BinSettings.papers`). By pull needs
+        the pull: `pull_bins.bin_by_pull` and `fit_bins`.
         Raises InputError where the data have fewer used bins than free parameters, or only one, and on bounds that the model does not have.
         """
         _refuse_percent(slip)
@@ -230,7 +231,6 @@ class AdhesionCurve:
             "bins": self.bins_.to_list(),
             "settings": self.bins_.settings.to_dict(),
             "clusters": self.bins_.clusters,
-            "common_slip_sd": self.common_slip_sd,
             "identifiability": {
                 "condition": badge.condition,
                 "identifiable": badge.identifiable,
@@ -239,6 +239,7 @@ class AdhesionCurve:
                 "sentence": badge.sentence,
             },
             "notes": list(self.notes_),
+            **({"common_slip_sd": self.common_slip_sd} if self.interval_ else {}),
             **band,
         }
 

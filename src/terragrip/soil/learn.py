@@ -60,7 +60,7 @@ class LearnedSoil:
     """One soil's fit with everything that the report shows beside it.
 
     `curve`: the fit that counts, by pull and without slip noise; `slip_noise`: the effect of that noise on it. `by_slip`: the paper's, each
-    pair sorted by its own slip (`curve` itself where that one counts).
+    pair sorted by its own slip (`curve` itself where that one counts, or the drives hold too few of the paper's slips).
     """
 
     soil: Soil
@@ -249,7 +249,7 @@ def _learn(
     sorted_by_slip = bin_parts(parts, template.bins.papers())
     verdict = _compared(sorted_by_slip)
     curve, by_slip = _fits(parts, template, sorted_by_slip, verdict)
-    if curve is not by_slip:
+    if curve.bins_.settings.by == BY_PULL:
         verdict = _compared(curve.bins_)
     if curve.interval_ and len(parts) < FEW_RUNS:
         curve.notes_.append(
@@ -257,7 +257,8 @@ def _learn(
             "they do not cover the differences between runs."
         )
     corrected = _of_noise(parts, curve) if np.isfinite(_joined(parts, "slip_std")).any() else None
-    if curve.bins_.settings.by == BY_SLIP and corrected is not None and corrected.moved > BIASED:
+    is_fixed = curve.identifiability_.identifiable
+    if curve.bins_.settings.by == BY_SLIP and is_fixed and corrected is not None and corrected.moved > BIASED:
         sentence = (
             f"Sorted by slip, its noise moves the curve by {corrected.moved:.0%}, so the data do not fix it."
         )

@@ -267,6 +267,7 @@ def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file:
     for key in ("settings", "identifiability", "by_slip"):
         if not isinstance(entry.get(key, {}), dict | None):
             raise InputError("is not a mapping", file=file, place=f"{place}.{key}")
+    _optional(entry.get("common_slip_sd"), file, f"{place}.common_slip_sd")
     badge, by_slip = entry.get("identifiability"), entry.get("by_slip")
     if badge:
         _number(badge.get("condition"), file, f"{place}.identifiability.condition")

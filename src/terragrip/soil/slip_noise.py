@@ -15,8 +15,10 @@ from numpy.typing import ArrayLike
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import bin_pairs
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.least_squares import INTERCEPT
 
 LEVELS = (0.5, 1.0, 1.5, 2.0)
 REPEATS = 8
@@ -26,20 +28,15 @@ SAMPLES = 20_000
 @dataclass(frozen=True)
 class SlipNoise:
     """`plain` and `corrected` free parameters; `slip_std`: the median SD of the slips within the bins' range; `matters`: the corrected
-    value is outside the plain fit's 95 % interval or more than 2 % away."""
+    value is outside the plain fit's 95 % interval or more than 2 % away; `moved`: the corrected curve less the plain one over the used
+    bins, relative to that (root mean squares)."""
 
     plain: Mapping[str, float]
     corrected: Mapping[str, float]
     slip_std: float
     matters: bool
     sentence: str
-
-    @property
-    def moved(self) -> float:
-        """The largest relative shift of a free parameter."""
-        return max(
-            abs(self.corrected[name] - plain) / max(abs(plain), 1e-9) for name, plain in self.plain.items()
-        )
+    moved: float = 0.0
 
 
 def correct_slip_noise(
@@ -100,9 +97,18 @@ def shifted(
     matters = any(_beyond(curve, name, plain[name], corrected[name]) for name in plain)
     moves = ", ".join(f"{name} {plain[name]:.4g} -> {corrected[name]:.4g}" for name in plain)
     verdict = f"it matters: {advice}" if matters else "it does not matter here"
-    return SlipNoise(
-        plain, corrected, noise, matters, f"Slip noise of {noise:.3f} (SD) moves {moves}; {verdict}."
-    )
+    sentence = f"Slip noise of {noise:.3f} (SD) moves {moves}; {verdict}."
+    return SlipNoise(plain, corrected, noise, matters, sentence, _moved(curve, plain, corrected))
+
+
+def _moved(curve: AdhesionCurve, plain: Mapping[str, float], corrected: Mapping[str, float]) -> float:
+    def heights(free: Mapping[str, float]) -> Floats:
+        given = {**curve.parameters_, **free}
+        return CURVES[curve.model].value(curve.bins_.slip[curve.bins_.used], given, given.pop(INTERCEPT, 0.0))
+
+    before = heights(plain)
+    size = float(np.linalg.norm(before))
+    return float(np.linalg.norm(heights(corrected) - before)) / max(size, 1e-9)
 
 
 def _beyond(curve: AdhesionCurve, name: str, plain: float, corrected: float) -> bool:
