@@ -36,3 +36,22 @@ def test_a_right_zero_noise_without_a_sign_and_creeping_are_left_alone() -> None
     assert rest_warnings(stopping(0.0, np.where(STOPS, receiver, 0.0))) == []
     creep = np.where(np.abs(TIME - 60) < 8, 0.2, 0.0)  # in one stop of three: it slid
     assert rest_warnings(stopping(0.0, creep)) == []
+
+
+def test_wheels_that_read_0_throughout_show_no_stop() -> None:
+    """A dead rim's usual speed is 0: the whole drive was a stop, and an offset of the whole speed was advised."""
+    steady = 2 + 0.03 * np.random.default_rng(5).standard_normal(len(TIME))
+    dead = np.zeros(len(TIME))
+    log = Recording(TIME, {"ground_speed": steady, "wheel_speed_l": dead, "wheel_speed_r": dead})
+    assert rest_warnings(log) == []
+
+
+def test_the_usual_speed_is_that_of_driving_however_long_the_vehicle_stands() -> None:
+    moving = TIME < 16
+    rim = np.where(moving, 1.5, 0.0)
+    ground = np.where(
+        moving & (np.arange(len(TIME)) % 4 > 0), np.nan, rim + 0.1
+    )  # known in few rows of driving
+    log = Recording(TIME, {"ground_speed": ground, "wheel_speed_l": rim / 0.4, "wheel_speed_r": rim / 0.4})
+    (note,) = rest_warnings(log)
+    assert float(note.split("at usual speed by ")[1].split(",")[0]) == pytest.approx(0.1 / 1.6, rel=0.02)

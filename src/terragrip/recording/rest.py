@@ -33,7 +33,10 @@ def rest_warnings(recording: Recording) -> list[str]:
         turning = np.abs(filled(recording.time, recording.channels[name]))
         if not np.isfinite(turning).all():
             return []
-        still &= turning <= _STILL * quantile(turning, 0.95)
+        usual = quantile(turning, 0.95)
+        if not usual > 0:  # dead, or it hardly ever turns: it shows no stop
+            return []
+        still &= turning <= _STILL * usual
     cut = np.flatnonzero(np.r_[True, (still[1:] != still[:-1]) | gaps(time), True])
     stops = []
     for first, after in pairwise(cut.tolist()):
@@ -47,8 +50,9 @@ def rest_warnings(recording: Recording) -> list[str]:
         return []
     means, scatter = np.array(stops).T
     shift = median(means)
-    usual = quantile(np.abs(ground[np.isfinite(ground)]), 0.95)
-    if not abs(shift) > max(_SHIFT * usual, _SURE * median(scatter)):
+    driven = np.abs(ground[~still & np.isfinite(ground)])
+    usual = quantile(driven, 0.95) if len(driven) else 0.0
+    if not usual > 0 or not abs(shift) > max(_SHIFT * usual, _SURE * median(scatter)):
         return []
     if quantile(np.abs(means - shift), 0.75) > _ALIKE * abs(shift):
         return []
