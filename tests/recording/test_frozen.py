@@ -90,6 +90,18 @@ def test_speeds_that_freeze_together_while_forces_go_on_are_named(every: int) ->
     assert frozen_warnings(pulling(**cruise)) == [], "a cruise by coarse speeds"
 
 
+def test_speeds_that_are_all_there_is_hang_with_the_logger() -> None:
+    """'While other channels go on' was said where there was none."""
+    rows = (TIME >= 20) & (TIME <= 40)
+    drive = log().channels
+    speeds = {"ground_speed": drive["ground_speed"], "wheel_based_speed": 0.4 * drive["wheel_speed_l"]}
+    held = {name: np.where(rows, values[rows][0], values) for name, values in speeds.items()}
+    notes = frozen_warnings(Recording(TIME, held))
+    assert notes == [
+        "All channels keep their values from 20.1 to 40 s: the logger hung, it seems. Leave these rows out."
+    ]
+
+
 def test_a_ground_speed_in_coarse_steps_is_named() -> None:
     """Of 2 km/h."""
     coarse = np.round(3.6 * log().channels["ground_speed"] / 2) * 2 / 3.6

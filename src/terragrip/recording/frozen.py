@@ -78,18 +78,23 @@ def _together(recording: Recording, speeds: dict[str, Floats]) -> list[str]:
     if "ground_speed" not in changing or len(recording) < 3:
         return []
     if len(changing) >= _SEVERAL and (stretch := _kept(recording, changing)):
-        return [
-            f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
-        ]
+        return [_hung(stretch)]
     moved = {n: v for n, v in speeds.items() if n in changing}
     if len(moved) < 2 or not (stretch := _kept(recording, moved)):
         return []
     if not all(_is_restless(recording.time, v) for v in moved.values()):
         return []
+    rows = (recording.time >= stretch[0]) & (recording.time <= stretch[1])
+    if not any(_range(v[rows]) > 0 for n, v in changing.items() if n not in moved):
+        return [_hung(stretch)]
     return [
         f"All speeds keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s while other channels go on: not measured, it seems. "
         "Leave these cells empty: the intervals then show how little is known."
     ]
+
+
+def _hung(stretch: tuple[float, float]) -> str:
+    return f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
 
 
 def _is_restless(time: Floats, values: Floats) -> bool:
