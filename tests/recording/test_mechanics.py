@@ -258,3 +258,15 @@ def test_without_an_accelerometer_the_thrust_tells_the_pitchs_sign() -> None:
     assert notes_on(scaled(columns, {"pitch": -1.0})).startswith(
         "pitch falls where the wheels are driven harder"
     )
+
+
+def test_the_thrust_that_is_told_beside_a_pull_is_the_whole_one_on_a_climb() -> None:
+    """What lifts the vehicle was left out of 'the drive torques over the wheel radius'."""
+    columns = scaled(pulling(), {"drawbar_force": 3.0})
+    columns["pitch"] = columns["pitch"] + 0.1
+    columns["acceleration_x"] = columns["acceleration_x"] + 0.1 * G
+    for wheel in WHEELS:
+        columns[f"drive_torque_{wheel}"] = columns[f"drive_torque_{wheel}"] + RADIUS * MASS * G * 0.1 / 4
+    thrust = sum(np.mean(columns[f"drive_torque_{wheel}"]) for wheel in WHEELS) / RADIUS / MASS / G
+    told = notes_on(columns).split("over the wheel radius are ")[1].split()[0]
+    assert float(told) == pytest.approx(thrust, abs=0.015)

@@ -112,3 +112,12 @@ def test_wheels_that_brake_on_average_while_nothing_pulls_have_a_sign() -> None:
     assert notes[0].startswith(
         "The drive torques over the wheel radius are -0.22 times the weight on average"
     )
+
+
+@pytest.mark.parametrize("pitched", [False, True])
+def test_an_accelerometer_without_a_value_hides_no_wrong_sign(pitched: bool) -> None:
+    """The mean of nothing was compared, with a RuntimeWarning on standard error."""
+    log = without_cell(working(scale=-1.0))
+    silent = np.full(len(log), np.nan)
+    log = log.with_channels(acceleration_x=silent, **({"pitch": silent} if pitched else {}))
+    assert any("-0.22 times the weight on average" in note for note in notes_of(log))

@@ -93,9 +93,11 @@ class Means:
 
     def moved(self, recording: Recording) -> Floats:
         """dv/dt + g sin(pitch) (n,) [m/s²]: the accelerometer's reading, else by the ground speed and the climb that is known."""
-        if "acceleration_x" in recording.channels:
-            return self.of(recording.channels["acceleration_x"])
-        return self.change + (0.0 if self.climb is None else self.climb)
+        moved = self.change + (0.0 if self.climb is None else np.nan_to_num(self.climb))
+        if "acceleration_x" not in recording.channels:
+            return moved
+        measured = self.of(recording.channels["acceleration_x"])
+        return np.where(np.isnan(measured), moved, measured)
 
     def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> Fit:
         """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: without the effect of climbs."""
@@ -291,7 +293,7 @@ def _pull_warnings(
     if known.sum() < _LEAST:
         return []
     moved = means.moved(recording) / STANDARD_GRAVITY
-    pulled, rest = float(np.mean(pull[known])), float(np.nanmean((left - moved)[known]))
+    pulled, thrust, rest = (float(np.mean(each[known])) for each in (pull, left + pull, left - moved))
     together = means.fit(left + pull - moved, pull)
     if pulled < -PULL and together.slope < _SURE * together.error:  # else a trailer pushes downhill
         return [
@@ -299,7 +301,7 @@ def _pull_warnings(
         ]
     if rest < -PULL:
         return [
-            f"The drive torques over the wheel radius are {rest + pulled:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
+            f"The drive torques over the wheel radius are {thrust:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
             "which leaves nothing to drive the vehicle: check the units of both, and that each wheel has its torque."
         ]
     if 0 < quantile(np.abs(pull[known]), 0.95) < _NO_PULL:
