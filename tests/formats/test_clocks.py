@@ -13,6 +13,8 @@ from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect
 from terragrip.formats.csv import csv_on_disk
 from terragrip.formats.log_blocks import recordings_of
+from terragrip.formats.stamps import Stamps
+from terragrip.formats.table import LogTable
 from terragrip.recording import Recording
 from terragrip.recording.alignment import aligned
 from terragrip.recording.lag import Speed, lag_between, lag_within
@@ -255,3 +257,14 @@ def test_a_column_named_time_that_counts_ticks_since_1970_is_proposed_in_its_uni
     assert seen.time.duration == pytest.approx(TIME[-1] - TIME[0])
     (tmp_path / "p.yaml").write_text(seen.profile)
     assert tg.read(log, tmp_path / "p.yaml").time[-1] == pytest.approx(TIME[-1] - TIME[0])
+
+
+def test_only_a_logs_first_rows_tell_of_a_clock_that_was_set() -> None:
+    """A later block of dates lost its rows before a jump."""
+    dates = np.datetime64("2020-05-01T10:00:00", "ms") + 1000 * np.arange(20)
+    later = dates + np.timedelta64(20, "s")
+    later = np.where(np.arange(20) < 5, later, later + np.timedelta64(4 * 365, "D"))
+    stamps = Stamps("t", "s")
+    for block in (dates[:0], dates, later):
+        assert len(stamps.corrected(LogTable(("t",), {"t": block})).columns["t"]) == len(block)
+    assert stamps.notes == []

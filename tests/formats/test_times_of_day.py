@@ -99,3 +99,26 @@ def test_stamps_that_are_no_times_are_refused_with_what_to_write(tmp_path: Path,
     log = log_of(tmp_path / "log.csv", Zeit=[stamp] * COUNT)
     with pytest.raises(InputError, match="is not a time; give seconds, 10:00:00"):
         tg.read(log, by_profile("Zeit"))
+
+
+def test_two_midnights_within_a_block_count_on_in_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """450 000 rows of 1 Hz were refused: 'time goes back from 203646 s'."""
+    count = 14_000
+    times = pd.date_range("2024-04-03 12:00:00", periods=count, freq="30s").strftime("%H:%M:%S")
+    log = tmp_path / "log.csv"
+    pd.DataFrame({"Time": times, "v": 1.5, "w": 3.0}).to_csv(log, index=False)
+    monkeypatch.setattr(csv_format, "_LONG", 0)
+    monkeypatch.setattr(csv_format, "_BLOCK", 30_000)
+    monkeypatch.setattr(csv_format, "ROWS", 7000)
+    parts = list(recordings_of(csv_format.csv_on_disk(str(log)), by_profile("Time")) or ())
+    assert max(part.time[-1] - part.time[0] for part in parts[:-1]) > 2 * 86_400
+    assert np.allclose(np.concatenate([part.time for part in parts]), 30 * np.arange(count))
+
+
+def test_a_clock_that_is_set_back_by_a_day_is_no_midnight(tmp_path: Path) -> None:
+    """Stamps since 1970 were moved on by a day, as if a clock of one day began anew."""
+    log = log_of(tmp_path / "log.csv", since=1.7e9 + SECONDS - np.where(SECONDS < 300, 0, 86_390))
+    with pytest.raises(InputError, match="goes back"):
+        tg.read(log, by_profile("since"))

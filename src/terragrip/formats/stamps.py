@@ -11,7 +11,7 @@ from terragrip.recording.columns import DAY, SINCE_1970
 from terragrip.units import factor_to
 
 _FIRST = 1000  # rows in which a logger's clock is set, if it was not
-_PERIODS = (DAY, 7 * DAY)  # s after which a time of day, or of a GPS week, begins anew
+_WEEK = 7 * DAY  # s: a time of day, or of a GPS week, is less
 _ABOUT = 60.0  # s: what a log may miss around midnight
 
 
@@ -22,12 +22,14 @@ class Stamps:
     column: str
     unit: str
     notes: list[str] = field(default_factory=list)
+    _started: bool = False
     _last: float | None = None  # s
     _midnights: float = 0.0  # s that they are to be moved by
 
     def corrected(self, block: LogTable) -> LogTable:
         """The next block, its stamps a time base."""
-        if self._last is None:
+        if not self._started:
+            self._started = len(block.columns[self.column]) > 0
             block = self._since_clock_was_set(block)
         return self._past_midnight(block)
 
@@ -66,8 +68,10 @@ class Stamps:
         first = seconds[known[0]] if self._last is None else self._last
         back = -np.diff(seconds[known], prepend=first)
         moved = np.zeros(len(stamps))
-        for period in _PERIODS:
-            moved[known] += period * ((back <= period) & (back > period - _ABOUT))
+        # Several at once end a week; and texts count midnights within a block, but not on into the next.
+        days = DAY * np.ceil(back / DAY)
+        anew = (days > 0) & (days - back < _ABOUT) & (seconds[known] < _WEEK)
+        moved[known] = np.where(anew, days, 0.0)
         self._last = float(seconds[known[-1]])
         if moved.any() and not self._midnights:
             self.notes.append("time begins anew at midnight in the log: what follows counts on from there.")
