@@ -242,7 +242,7 @@ struct tg_estimator {
     int32_t sparse_wheels;
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
-    double yaw_time;           /* of its last sample */
+    double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
     tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate; else 0 */
     double slow_time;          /* when the ground speed was last near 0 */
     tg_lowpass soon[8], soon_ground; /* speeds, low-passed as little as can be */

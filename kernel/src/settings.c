@@ -333,6 +333,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
+    e->yaw_time = -INFINITY;
     work_out_constants(settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
