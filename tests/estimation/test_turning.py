@@ -101,3 +101,43 @@ def test_turns_that_nothing_tells_are_said_where_they_are_a_tenth(
         assert words[0].startswith(f"The rims of left and right differ in {windows:.0%} of the driving")
     still = log_of(wheel_speed_rl=0.05 * (1 - turn), wheel_speed_rr=0.05 * (1 + turn))
     assert _unseen_turns(still, RIMS) == []
+
+
+def test_positions_that_are_silent_where_the_gyroscope_is_show_nothing() -> None:
+    """'The rate of turn is that of the positions there' was said of rows without any, and nothing of their slips."""
+    log = turning_log(3, seconds=160.0)
+    known = log.time < 60
+    log = log.with_channels(angular_velocity_z=np.where(known, 0.1, np.nan))
+    log = log.with_channels(**{name: np.where(known, log[name], np.nan) for name in POSITIONS})
+    shown, (note,) = turn_in(LogBlocks.of(log), log, machine())
+    assert shown is None
+    assert "Log the yaw rate throughout" in note
+
+
+def test_positions_of_a_part_of_the_log_leave_the_other_turns_said() -> None:
+    log = turning_log(3, seconds=160.0)
+    log = log.with_channels(**{name: np.where(log.time < 60, log[name], np.nan) for name in POSITIONS})
+    shown, notes = turn_in(LogBlocks.of(log), log, machine())
+    assert shown is not None
+    assert notes[0] == SAID
+    (unseen,) = notes[1:]
+    assert unseen.startswith("The rims of left and right differ in")
+
+
+def test_the_last_rate_before_a_silence_is_the_gyroscopes() -> None:
+    log = turning_log(3, seconds=160.0)
+    measured = log.time < 60
+    log = log.with_channels(angular_velocity_z=np.where(measured, 0.123, np.nan))
+    shown, _ = turn_in(LogBlocks.of(log), log, machine())
+    assert shown is not None
+    assert (shown.over(log)[measured] == 0.123).all()
+    assert shown.over(log)[np.flatnonzero(measured)[-1] + 1] != 0.123
+
+
+def test_stamps_before_0_change_no_interval_in_a_turn() -> None:
+    """Without a yaw rate the turn counted only from 1 s on: slips of a log with stamps from before its trigger were too sure."""
+    log = turning_log(3, seconds=40.0, circling=True)
+    log = without(log, *POSITIONS)
+    plain = tg.estimate(log, machine())["slip_r_std"]
+    early = tg.estimate(replace(log, time=log.time - 100), machine())["slip_r_std"]
+    np.testing.assert_allclose(early, plain, rtol=0.01)

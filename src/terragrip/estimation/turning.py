@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terragrip.arrays import Floats
+from terragrip.arrays import Bools, Floats
 from terragrip.estimation.rims import Rim, rims_of
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.track import Track, track_of
@@ -35,9 +35,19 @@ class ShownTurn:
         placed = self.track.at("turn", recording.time)
         if self.silences is None:
             return placed
-        place = np.searchsorted(self.silences[:, 0], recording.time, side="right") - 1
-        silent = (place >= 0) & (recording.time < self.silences[place, 1])
-        return np.where(silent, placed, recording.channels[_YAW_RATE])
+        return np.where(self._silent(recording.time), placed, recording.channels[_YAW_RATE])
+
+    def shows(self) -> bool:
+        """Whether the positions tell a turn where it is needed."""
+        known = self.track.time[np.isfinite(self.track.turn)]
+        return bool(np.any(self._silent(known)))
+
+    def _silent(self, time: Floats) -> Bools:
+        """Which instants (n,) are without a gyroscope's rate, that of the last before a silence not among them."""
+        if self.silences is None:
+            return np.ones(len(time), dtype=bool)
+        starts, ends = self.silences.T
+        return np.searchsorted(starts, time) > np.searchsorted(ends, time, side="right")
 
 
 def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownTurn | None, list[str]]:
@@ -54,13 +64,15 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownT
         return None, unseen
     whole = _turns(log)
     track = track_of(whole, _CALM)
-    if track is None or not np.isfinite(track.turn).any():
+    if track is None:
         return None, unseen
-    if _YAW_RATE not in channels:
-        return ShownTurn(track), ["The rate of turn is that of the positions."]
-    return ShownTurn(track, _silences(whole)), [
-        f"{_YAW_RATE} falls silent where the machine turns: the rate of turn is that of the positions there."
-    ]
+    shown = ShownTurn(track, _silences(whole) if _YAW_RATE in channels else None)
+    if not shown.shows():
+        return None, unseen
+    said = "The rate of turn is that of the positions."
+    if _YAW_RATE in channels:
+        said = f"{_YAW_RATE} falls silent where the machine turns: the rate of turn is that of the positions there."
+    return shown, [said, *_unseen_turns(sample.with_channels(**{_YAW_RATE: shown.over(sample)}), rims)]
 
 
 def _turns(log: LogBlocks) -> Recording:
