@@ -13,7 +13,8 @@ void tgi_reset_slips(tg_estimator *e)
 }
 
 /* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. A wheel that
- * is silent itself says nothing of the ground speed, unless all are: its belief follows from the ground speed. */
+ * is silent itself says nothing of the ground speed, unless all are: its belief follows from the ground speed. What a turn adds to the rim
+ * is taken off: the wheels that are heard may be those of one side. */
 static void means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
 {
     const int32_t n = e->settings.machine.wheels;
@@ -25,8 +26,9 @@ static void means(const tg_estimator *e, const tg_row *row, const tg_drive *driv
         const int32_t known = row && !isnan(row->value[TG_WHEEL_SPEED + i]) && !(row->doubt[i] > 0);
         const tg_real omega = known ? (tg_real)e->direction * row->value[TG_WHEEL_SPEED + i] : e->belief.x[n + 2 + i];
         const int32_t counts = !row || known || row->time - e->wheel[i].time <= (double)e->settings.tuned.silence;
-        speed += counts ? e->settings.rolling_radius[i] * omega : 0;
-        believed += e->settings.rolling_radius[i] * omega;
+        const tg_real middle = e->settings.rolling_radius[i] * omega + (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
+        speed += counts ? middle : 0;
+        believed += middle;
         heard += counts;
     }
     *rim = heard ? speed / (tg_real)heard : believed / (tg_real)n;

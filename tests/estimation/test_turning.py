@@ -141,3 +141,19 @@ def test_stamps_before_0_change_no_interval_in_a_turn() -> None:
     plain = tg.estimate(log, machine())["slip_r_std"]
     early = tg.estimate(replace(log, time=log.time - 100), machine())["slip_r_std"]
     np.testing.assert_allclose(early, plain, rtol=0.01)
+
+
+@pytest.mark.parametrize("silent", ["l", "r"])
+def test_a_side_that_is_silent_with_the_ground_speed_in_a_turn_shifts_no_speed(silent: str) -> None:
+    """The other side's rims were taken for the machine's: the inner ones too slow, the outer ones too fast."""
+    log = turning_log(1000, seconds=40.0, circling=True, soft=0.0)
+    yaw = np.convolve(0.12 + 0.08 * np.sin(log.time / 17), np.ones(10) / 10, "same")
+    lost = (log.time >= 30) & (log.time < 38)
+    names = ("ground_speed", f"wheel_speed_{silent}")
+    log = without(log, *POSITIONS).with_channels(angular_velocity_z=yaw)
+    log = log.with_channels(**{name: np.where(lost, np.nan, log[name]) for name in names})
+    estimates = tg.estimate(log, machine())
+    true, late = 1.2 + 0.2 * np.sin(log.time / 11), (log.time > 32) & lost
+    off = (estimates["ground_speed"] - true)[late]
+    assert np.mean(np.abs(off) < 1.96 * estimates["ground_speed_std"][late]) > 0.95
+    assert abs(np.mean(off)) < TRACK / 2 * np.mean(yaw[late])
