@@ -173,13 +173,7 @@ def learn_soils(
         settings = special.get(name, template.bins)
         try:
             learned = _learn(
-                name,
-                parts,
-                template.unfitted(bins=settings),
-                mass,
-                sample_period,
-                wheels,
-                source,
+                name, parts, template.unfitted(bins=settings), mass, sample_period, wheels, source
             )
         except InputError as error:
             missed[name] = str(error)

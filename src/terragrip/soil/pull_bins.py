@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from terragrip.arrays import Floats
 from terragrip.physics.adhesion import PROTOTYPE
-from terragrip.soil.bins import BY_PULL, Bins, BinSettings, height_of, slip_of
+from terragrip.soil.bins import PULL, Bins, BinSettings, height_of, slip_of
 
 _WIDEST = 0.1
 _ROUNDS = 30
@@ -46,7 +46,7 @@ def bin_by_pull(
     `std` of a bin is the SD of adhesion about the curve through it. Pairs without slip, adhesion, pull or distance, and pulls outside
     the range, are left out and counted. ValueError if the lengths differ.
     """
-    chosen = settings or BinSettings(by=BY_PULL)
+    chosen = settings or PULL
     columns = [np.ravel(np.asarray(x, dtype=float)) for x in (slip, adhesion, pull, metres)]
     labels = np.zeros(columns[0].size, dtype=np.int64) if cluster is None else np.ravel(np.asarray(cluster))
     if len({labels.size, *(x.size for x in columns)}) > 1:
