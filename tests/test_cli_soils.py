@@ -325,6 +325,21 @@ def test_data_do_not_fix_a_curve_that_explains_little_of_them(
     assert f"no (R2 {result['r2']:.2f})" in output
 
 
+def test_the_table_says_no_where_the_library_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A scale that stops at the end of its range: the condition number and R2 alone would say yes."""
+    points = tmp_path / "points.csv"
+    slip = np.linspace(0.06, 0.55, 25)
+    mu = CURVES["exponential"].value(slip, {"a": 10.3})
+    points.write_text("slip,mu\n" + "\n".join(f"{s:.4f},{m:.4f}" for s, m in zip(slip, mu, strict=True)))
+    badge = learn(tmp_path / "soils.json", points, "--soil", "clay")["soils"]["clay"]["identifiability"]
+    assert badge["identifiable"] is False
+    assert "stopped at an end" in badge["sentence"]
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("clay "))
+    assert row.rstrip().endswith("no")
+
+
 def test_digitised_points_begin_where_bins_by_slip_do(tmp_path: Path) -> None:
     """They have no pull, so the usual way does not lower their first slip; --lower does."""
     slip = np.linspace(0.01, 0.5, 50)

@@ -13,7 +13,8 @@ from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, PROTOTYPE
 from terragrip.soil.bins import BinSettings, bin_pairs, slip_of
 from terragrip.soil.choice import FORMS, FormScore, _bin_folds, _run_folds, _score, _split, compare_forms
-from terragrip.soil.fit import AdhesionCurve, _at_bound, _student
+from terragrip.soil.fit import AdhesionCurve, _student
+from terragrip.soil.identifiability import at_bound
 from terragrip.soil.known import known_soils
 from terragrip.soil.least_squares import _jacobian, solve, starts
 from terragrip.soil.library import Soil, SoilLibrary
@@ -105,8 +106,8 @@ def test_a_thousandth_of_its_range_from_an_end_a_parameter_is_at_it(value: float
     first = EFFECTIVE.parameters[0]
     at = first.lower + value * (first.upper - first.lower)
     held = {p.name: p.start for p in EFFECTIVE.parameters} | {first.name: at}
-    assert _at_bound(EFFECTIVE, held, [first.name]) == ([first.name] if bound else [])
-    assert _at_bound(EFFECTIVE, held, []) == []
+    assert at_bound(EFFECTIVE, held, [first.name]) == ([first.name] if bound else [])
+    assert at_bound(EFFECTIVE, held, []) == []
 
 
 def test_weights_by_count_are_those_of_the_standard_error() -> None:

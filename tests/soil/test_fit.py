@@ -119,6 +119,20 @@ def test_a_fit_keeps_to_its_bounds_and_what_stops_there_is_not_identified():
             AdhesionCurve(bounds=wrong).fit(slip, mu, run)
 
 
+def test_a_curve_with_every_parameter_given_is_evaluated():
+    slip, mu, run = pairs(5, a=0.85)
+    given = {**PROTOTYPE, "a": 0.85}
+    curve = AdhesionCurve(fixed=given).fit(slip, mu, run)
+    used = curve.bins_.used
+    off = curve.bins_.mean[used] - CURVES["exponential"].value(curve.bins_.slip[used], given)
+    spread = curve.bins_.mean[used] - curve.bins_.mean[used].mean()
+    assert curve.r2_ == pytest.approx(1 - off @ off / (spread @ spread))
+    assert curve.parameters_ == given
+    assert curve.interval_ == {}
+    assert not curve.identifiability_.identifiable
+    assert "Every parameter is given" in curve.notes_[0]
+
+
 def test_net_traction_needs_its_intercept():
     slip, mu, run = pairs(6, a=0.85)
     with_rho = AdhesionCurve(intercept=True).fit(slip, mu - 0.12, run)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -195,6 +195,8 @@ def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> s
 def table(library: Mapping[str, Soil]) -> str:
     """The library as lines of text: soil, model, free parameters with intervals, R2, NRMSE, bins and what sorted them, the paper's way
     (a and R2 with bins by slip), the badge."""
+    from terragrip.soil.identifiability import Identifiability
+
     head = (
         "soil",
         "model",
@@ -217,24 +219,13 @@ def table(library: Mapping[str, Soil]) -> str:
             )
         score = ["" if value is None else f"{value:.3f}" for value in (one.r2, one.nrmse)]
         badge, settings = one.fit.get("identifiability"), one.fit.get("settings") or {}
-        fixed = "" if not badge else _fixed(one, badge)
+        fixed = "" if not badge else Identifiability.from_dict(badge).short(one.r2)
         bins = f"{len(one.bins)} by {settings.get('by', 'slip')}" if one.bins else ""
         rows.append((name, one.model, ", ".join(words), *score, bins, _by_slip(one), fixed))
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )
-
-
-def _fixed(soil: Soil, badge: Mapping[str, Any]) -> str:
-    """Whether the data fix what was fitted; why not: the condition number, or a curve that explains too little of its bins."""
-    from terragrip.soil.identifiability import LIMIT, POOR
-
-    if badge["condition"] >= LIMIT:
-        return f"no ({badge['condition']:.1g})"
-    if soil.r2 is not None and soil.r2 < POOR:
-        return f"no (R2 {soil.r2:.2f})"
-    return "yes"
 
 
 def _by_slip(soil: Soil) -> str:

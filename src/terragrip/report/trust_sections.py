@@ -8,7 +8,6 @@ from terragrip.report.curves import SoilCurves
 from terragrip.report.page import Section, Table, names, number, percent
 from terragrip.report.soil_sections import NO_SOILS, NONE_FITTED, NOTHING
 from terragrip.soil.fit import FREE, AdhesionCurve
-from terragrip.soil.identifiability import Identifiability
 from terragrip.soil.learn import APART, scales_apart
 from terragrip.soil.missing import in_words
 
@@ -99,20 +98,11 @@ def _trust_row(one: SoilCurves) -> tuple[str, ...]:
         ) + (" (matters)" if noise.matters else "")
     return (
         one.name,
-        _badge(badge, one.learned.soil.r2),
+        badge.short(one.learned.soil.r2),
         "–" if verdict is None else "yes" if verdict.follows else f"no: use {verdict.proposal}",
         number(noise.slip_std if noise else None),
         corrected,
     )
-
-
-def _badge(badge: Identifiability, r2: float | None) -> str:
-    """Whether the data fix the fit, with what says so: the condition number, or R2 where the curve explains too little."""
-    if badge.condition != badge.condition:  # a curve that was not fitted
-        return "–"
-    if badge.separable and not badge.identifiable:
-        return f"no (R² {number(r2, 2)})"
-    return f"{'yes' if badge.identifiable else 'no'} ({badge.condition:.3g})"
 
 
 def _ranking(curves: Sequence[SoilCurves]) -> list[Table]:

@@ -13,7 +13,7 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
 from terragrip.soil.bins import Bins, BinSettings, bin_pairs
-from terragrip.soil.identifiability import Identifiability, judge
+from terragrip.soil.identifiability import Identifiability, at_bound, judge, left_open
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
 if TYPE_CHECKING:
@@ -22,12 +22,8 @@ if TYPE_CHECKING:
     from terragrip.soil.library import SoilLibrary
 
 FREE = "free"
-AT_BOUND = 1e-3
-"""Share of a parameter's range that counts as its end."""
 _LARGEST = 1.5
 """Slip above which most rows of a drive never are, as a ratio; in per cent nearly all are."""
-VAGUE = 1.0
-"""Width of a 95 % interval, over the value, from which the data do not fix it."""
 BAND = np.round(np.linspace(0.0, 1.0, 101), 3)
 """Slips that a band is written at."""
 
@@ -108,15 +104,17 @@ class AdhesionCurve:
         if np.count_nonzero(used) < need:
             raise InputError(
                 f"{np.count_nonzero(used)} slip bins between {bins.settings.lower:.0%} and {bins.settings.upper:.0%} hold "
-                f"{bins.settings.least_text} or more, too few to fit {', '.join(free)}",
+                f"{bins.settings.least_text} or more, too few to fit {', '.join(free) or 'or judge a curve'}",
                 hint="drive at more slips, or widen the bins",
             )
         slip, mean = bins.slip[used], bins.mean[used]
         weights = self._bin_weights(bins)[used]
-        begin = starts(curve, free, mean)
-        many = np.ones((len(begin), 1))
-        x, cost = solve(curve, free, held, many * slip, many * mean, many * weights, begin)
-        best = x[int(np.argmin(cost))]
+        best = np.empty(0)
+        if free:
+            begin = starts(curve, free, mean)
+            many = np.ones((len(begin), 1))
+            x, cost = solve(curve, free, held, many * slip, many * mean, many * weights, begin)
+            best = x[int(np.argmin(cost))]
         self.free_ = tuple(free)
         self.parameters_ = {**held, **dict(zip(free, best.tolist(), strict=True))}
         self.bins_ = bins
@@ -125,33 +123,23 @@ class AdhesionCurve:
         self.r2_ = float(1 - residual @ residual / max(float(spread @ spread), 1e-300))
         self.nrmse_ = float(np.sqrt(np.mean(residual**2)) / max(float(np.ptp(mean)), 1e-300))
         self.identifiability_: Identifiability = judge(curve, self._of_model(), free, slip, self.r2_)
-        self.at_bound_ = _at_bound(curve, self.parameters_, free)
-        if self.at_bound_:
-            ends = f"{', '.join(self.at_bound_)} stopped at an end of its range, so the data do not fix it."
-            self.identifiability_ = replace(self.identifiability_, identifiable=False, sentence=ends)
+        self.at_bound_ = at_bound(curve, self.parameters_, free)
         self.notes_: list[str] = (
             [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
         )
         self.samples_: Floats | None = None
         self.interval_: dict[str, tuple[float, float]] = {}
-        if self.bootstrap:
+        if self.bootstrap and free:
             self._resample(curve, free, held, best)
-            self._judge_interval()
+        if len(free) == 1 and free[0] in self.interval_:
+            self.doubt(left_open(free[0], self.parameters_[free[0]], self.interval_[free[0]]))
         return self
 
-    def _judge_interval(self) -> None:
-        """Take the badge from one free parameter that the interval leaves open, as where the zero of slip is not known."""
-        (name, *more) = self.free_
-        low, high = self.interval_.get(name, (0.0, 0.0))
-        if (
-            more
-            or not self.identifiability_.identifiable
-            or high - low <= VAGUE * abs(self.parameters_[name])
-        ):
-            return
-        sentence = f"The data leave {name} open, {low:.3g} to {high:.3g}: more slip or a better known radius would fix it."
-        self.identifiability_ = replace(self.identifiability_, identifiable=False, sentence=sentence)
-        self.notes_.append(sentence)
+    def doubt(self, sentence: str) -> None:
+        """Take the badge from the fit for this reason, and note it; not where it is empty, or another took the badge before."""
+        if sentence and self.identifiability_.identifiable:
+            self.identifiability_ = self.identifiability_.denied(sentence)
+            self.notes_.append(sentence)
 
     def predict(self, slip: ArrayLike) -> Floats:
         """mu (or kappa, with an intercept) at the slips, same shape. Raises InputError where they are per cents."""
@@ -214,7 +202,6 @@ class AdhesionCurve:
 
     def to_dict(self) -> dict[str, Any]:
         """The fit in the form of soils.json (architecture.md, contracts)."""
-        badge = self.identifiability_
         band = {}
         if self.samples_ is not None and len(self.free_) > 1:
             low, high = self.band(BAND)
@@ -231,13 +218,7 @@ class AdhesionCurve:
             "bins": self.bins_.to_list(),
             "settings": self.bins_.settings.to_dict(),
             "clusters": self.bins_.clusters,
-            "identifiability": {
-                "condition": badge.condition,
-                "identifiable": badge.identifiable,
-                "effective": badge.effective,
-                "twin": badge.twin,
-                "sentence": badge.sentence,
-            },
+            "identifiability": self.identifiability_.to_dict(),
             "notes": list(self.notes_),
             **({"common_slip_sd": self.common_slip_sd} if self.interval_ else {}),
             **band,
@@ -341,16 +322,6 @@ class AdhesionCurve:
             )
         }
         return AdhesionCurve(**{**same, **changes})
-
-
-def _at_bound(curve: CurveModel, parameters: Mapping[str, float], free: Sequence[str]) -> list[str]:
-    """The free parameters within AT_BOUND of a bound."""
-    return [
-        p.name
-        for p in curve.parameters
-        if p.name in free
-        and min(parameters[p.name] - p.lower, p.upper - parameters[p.name]) <= AT_BOUND * (p.upper - p.lower)
-    ]
 
 
 def _student(freedom: int) -> float:

@@ -57,11 +57,7 @@ def _fitted(soil: Soil, fit: Mapping[str, Any]) -> AdhesionCurve:
         settings, column["slip"], column["mean"], column["std"], np.nan_to_num(column["count"]).astype(np.int64),
         weight, weight * column["mean"], weight * column["slip"],
     )  # fmt: skip
-    badge = fit.get("identifiability") or {}
-    curve.identifiability_ = Identifiability(
-        badge.get("condition", np.nan), badge.get("identifiable", False), badge.get("effective"), badge.get("twin"), None,
-        badge.get("sentence", ""),
-    )  # fmt: skip
+    curve.identifiability_ = Identifiability.from_dict(fit.get("identifiability") or {})
     return curve
 
 

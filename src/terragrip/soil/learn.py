@@ -15,6 +15,7 @@ from terragrip.html import html_notes
 from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, PULL, Bins, BinSettings, bin_pairs
 from terragrip.soil.choice import FORMS, LEAST_BINS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.identifiability import moved_by_noise
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
 from terragrip.soil.pull_bins import bin_by_pull
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
-BIASED = 0.1
-"""Relative shift of a curve by the noise of slip from which a fit by slip is a hint only."""
 APART = 0.03
 """Relative difference of the scale by pull from that by slip beyond which it is reported."""
 FALL = 0.05
@@ -251,13 +250,8 @@ def _learn(
             "they do not cover the differences between runs."
         )
     corrected = _of_noise(parts, curve) if np.isfinite(_joined(parts, "slip_std")).any() else None
-    is_fixed = curve.identifiability_.identifiable
-    if curve.bins_.settings.by == BY_SLIP and is_fixed and corrected is not None and corrected.moved > BIASED:
-        sentence = (
-            f"Sorted by slip, its noise moves the curve by {corrected.moved:.0%}, so the data do not fix it."
-        )
-        curve.identifiability_ = replace(curve.identifiability_, identifiable=False, sentence=sentence)
-        curve.notes_.append(sentence)
+    if curve.bins_.settings.by == BY_SLIP and corrected is not None:
+        curve.doubt(moved_by_noise(corrected.moved))
     resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
     if by_slip is not curve:
