@@ -325,9 +325,7 @@ def test_data_do_not_fix_a_curve_that_explains_little_of_them(
     assert f"no (R2 {result['r2']:.2f})" in output
 
 
-def test_the_table_says_no_where_the_library_does(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_says_no_where_the_library_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A scale that stops at the end of its range: the condition number and R2 alone would say yes."""
     points = tmp_path / "points.csv"
     slip = np.linspace(0.06, 0.55, 25)

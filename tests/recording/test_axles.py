@@ -17,7 +17,7 @@ from terragrip.vehicle import Vehicle
 Case = tuple[families.Kind, int, float]
 UNEQUAL: list[Case] = [
     (families.Kind("light", "sinkage", "even"), 4, 20.0),
-    (families.Kind("robot", "saturating", "even"), 17, 10.0),
+    (families.Kind("tractor", "saturating", "even"), 8316, 20.0),
     (families.Kind("light", "saturating", "multirate"), 15, 50.0),
     (families.Kind("robot", "saturating", "multirate"), 7, 1.0),
 ]
@@ -57,6 +57,12 @@ def test_exchanged_masses_are_named(case: Case) -> None:
     light = min(vehicle.axles, key=lambda name: vehicle.axles[name].mass)
     assert f"as its slip and that of {light} allow," in note, "the light axle is taken for the heavy one"
     assert "check the masses of the axles" in note
+
+
+def test_radii_that_the_file_hardly_knows_explain_as_much() -> None:
+    log, vehicle = drive(*UNEQUAL[0])
+    unsure = vehicle.uncertainty.model_copy(update={"wheel_radius": 0.1})
+    assert said(log, exchanged(vehicle).model_copy(update={"uncertainty": unsure})) == []
 
 
 def test_exchanged_torques_of_axles_look_alike_and_are_named_too() -> None:

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 _LEAST = 15  # windows
 _PULLING = 0.5  # of the thrust that a twentieth of the windows exceed
 _STRAIGHT = 0.05  # of an axle's rims from side to side
-_SLIP = 0.02  # less is of the size of the radii's errors,
-_RADII = 0.01  # which are a like share of the slip, and so of the adhesion
+_SLIP = 0.02  # less is of the size of the errors of the radii, which are a like share of the slip, and so of the adhesion;
+_RADII = 0.01  # where the vehicle file states none
 _UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' trodden track
 _RESTORED = 0.4  # of the difference, at most, is left when what was exchanged is put right
 
@@ -53,6 +53,9 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         return []
     pulls = _pulls(recording, vehicle, means, total)
 
+    stated = vehicle.uncertainty.wheel_radius
+    radii = _RADII if stated is None else np.sqrt(2) * stated  # of two axles' radii, each by itself
+
     def beyond(forces: dict[int, Floats], masses: Floats, slope: float, pair: tuple[int, int]) -> list[float]:
         of = [_difference(forces, vehicle, masses, means, pull, rows, pair) for pull in pulls]
         return [_beyond(one, slope) for one in of]
@@ -66,7 +69,7 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         exchanged = vehicle.axle_mass.copy()
         exchanged[[a, b]] = exchanged[[b, a]]
         off = beyond(thrust, vehicle.axle_mass, steepest, (a, b))
-        least, uneven = min(off, key=abs), _UNEVEN + _RADII / min(slips)
+        least, uneven = min(off, key=abs), _UNEVEN + radii / min(slips)
         if min(off) * max(off) <= 0 or abs(least) <= uneven:
             continue
         causes = {
