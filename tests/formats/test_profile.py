@@ -203,6 +203,17 @@ def test_speed_from_one_coordinate_and_without_heading() -> None:
     np.testing.assert_allclose(unsigned["ground_speed"][inner], np.abs(speed)[inner], atol=0.01)
 
 
+def test_a_speed_from_whole_numbers_of_1e_7_degrees(foreign: pd.DataFrame) -> None:
+    north = 48.0 + 2.0 * 0.05 * np.arange(200) / 111_200.0
+    east = 11.0 + 1e-9 * np.arange(200)
+    frame = foreign.assign(lat=np.round(1e7 * north), lon=np.round(1e7 * east))
+    source = {"derivative_of": ["lat", "lon"], "unit": "deg", "window": "2 s"}
+    with pytest.raises(InputError, match=r"none of its values is a latitude in degrees; .* 'scale: 1e-7'"):
+        apply(frame, ground_speed=source)
+    speed = apply(frame, ground_speed={**source, "scale": 1e-7}).channels["ground_speed"]
+    assert speed[40:160] == pytest.approx(2.0, rel=5e-3)
+
+
 def test_counts_of_an_encoder_become_a_wheel_speed() -> None:
     """1200 counts a turn at 10 Hz, forward, at rest and backward; one column needs no list."""
     time = np.arange(0, 30, 0.1)

@@ -151,6 +151,26 @@ def test_positions_tell_the_unit_of_a_speed(unit: str, factor: float) -> None:
     assert any("path of lat, lon" in sentence for sentence in result.evidence)
 
 
+@pytest.mark.parametrize(
+    ("names", "doubt"), [(("lat_e7", "lon_e7"), ""), (("Lat", "Lng"), "whole numbers up to")]
+)
+def test_whole_numbers_of_1e_7_degrees_are_positions(names: tuple[str, str], doubt: str) -> None:
+    place = dict(zip(names, [np.round(1e7 * part) for part in _place().values()], strict=True))
+    result = _propose({"speed": SPEED, **place})
+    assert result["latitude"].entry == {"from": names[0], "scale": pytest.approx(1e-7)}
+    assert result["latitude"].doubt.startswith(doubt)
+    assert bool(doubt) == bool(result["longitude"].doubt)
+    assert result["ground_speed"].columns == ("speed",)
+    assert any("path of" in sentence for sentence in result["ground_speed"].evidence)
+
+
+def test_degrees_and_minutes_are_no_degrees() -> None:
+    place = {name: 100 * np.floor(v) + 60 * (v % 1) for name, v in _place().items()}
+    result = _propose({"speed": SPEED, **place})
+    assert "latitude" not in result
+    assert any("lat in deg" in note and "degrees and minutes" in note for note in result.left_out)
+
+
 @pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_a_speed_without_unit_or_check_has_a_question_mark(factor: float) -> None:
     result = _propose({"speed": factor * SPEED}).get("ground_speed")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from terragrip.formats.candidates import Column, candidates_of, kind_of
+from terragrip.formats.candidates import Column, candidates_of
 from terragrip.formats.evidence import (
     RATE_UNITS,
     Evidence,
@@ -15,12 +16,14 @@ from terragrip.formats.evidence import (
     Series,
     nearest_unit,
 )
-from terragrip.formats.judgement import Guess
+from terragrip.formats.judgement import E7, Guess
 from terragrip.formats.rims import Ranked, Rims, Way, surest
+from terragrip.recording.checks import PLACES
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
 _KNOWN = ("Terragrip", "a signal")
+_E7 = re.compile(r"e-?7\W*$", re.IGNORECASE)
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
 
 
@@ -58,15 +61,19 @@ class Agreement:
                     else g
                     for g in ranked.get(channel, [])
                 ]
-        for channel in ("latitude", "longitude"):
-            limit = 90.001 if channel == "latitude" else 180.001
-            ranked[channel] = [
-                g
-                for g in ranked.get(channel, [])
-                if kind_of(g.unit) != "angle"
-                or g.unit not in ("deg", "°")
-                or self._evidence.size(g.column.column) <= limit
-            ]
+        for channel, limit in PLACES.items():
+            ranked[channel] = [self._in_range(g, limit + 1e-3) for g in ranked.get(channel, [])]
+
+    def _in_range(self, guess: Guess, limit: float) -> Guess:
+        """A latitude or longitude in degrees, or in whole numbers of 1e-7 degrees; in doubt where it is neither."""
+        size, name = self._evidence.size(guess.column.column), guess.column.column
+        says_so = guess.column.unit is None and _E7.search(name) is not None
+        if guess.unit not in ("deg", "°") or (size <= limit and not says_so):
+            return guess
+        if self._evidence.is_whole(name) and size * factor_to(E7, "deg") <= limit:
+            doubt = "" if says_so else f"whole numbers up to {size:.0f}: 1e-7 degrees?"
+            return replace(guess, unit=E7, unit_doubt=doubt)
+        return replace(guess, confidence=0.2, doubt=f"reaches {size:.5g} (degrees and minutes, ddmm.mmmm?)")
 
     def _paths(self, ranked: Mapping[str, list[Guess]]) -> list[Way]:
         """What was driven, in metres: by latitude and longitude, by positions, by a distance."""
@@ -76,10 +83,11 @@ class Agreement:
             north is not None
             and east is not None
             and north.unit == east.unit
-            and north.unit in ("deg", "rad")
+            and north.unit in ("deg", "rad", E7)
+            and not (north.doubt or east.doubt)
         ):
             pair = (north.column.column, east.column.column)
-            factor = 1.0 if north.unit == "deg" else 180 / np.pi
+            factor = factor_to(north.unit, "deg")
             if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
                 result.append((f"{pair[0]}, {pair[1]}", path))
         for name, column in self._columns.items():

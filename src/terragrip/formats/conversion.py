@@ -26,6 +26,7 @@ from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
+from terragrip.recording.checks import PLACES, refuse_place
 from terragrip.recording.columns import (
     DAY,
     SINCE_1970,
@@ -238,7 +239,7 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
             raw = quotient(time, raw, divisor, origin.over_minimum)
     factor = _factor(name, origin, log)
     if deviation is not None:
-        deviation *= abs(factor * origin.scale)
+        deviation *= abs(factor) if origin.is_geographic else abs(factor * origin.scale)
     gain, offset = origin.gain(factor)
     return (raw if (gain, offset) == (1.0, 0.0) else gain * raw + offset), deviation
 
@@ -303,6 +304,9 @@ def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | 
     """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation."""
     positions = _raw(origin.derivative_of or (), log, time)
     if origin.is_geographic:
+        positions = [origin.scale * part for part in positions]
+        for channel, column, part in zip(PLACES, origin.derivative_of or (), positions, strict=True):
+            refuse_place(column, part, log.source, channel)
         positions = list(metres_of(*positions))
     fresh = fresh_positions(time, positions) & np.isfinite(time)
     when, where = time[fresh], np.stack([p[fresh] for p in positions], axis=1)

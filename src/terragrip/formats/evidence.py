@@ -120,6 +120,12 @@ class Evidence:
         values = values[np.isfinite(values)]
         return float(np.quantile(values, 0.95)) if len(values) else 0.0
 
+    def is_whole(self, name: str) -> bool:
+        """Whether all values are whole numbers."""
+        values = self._columns[name]
+        values = values[np.isfinite(values)]
+        return bool(np.all(values == np.round(values)))
+
     def displacements(self, pair: tuple[str, str], *, degrees: bool, unit: float = 1.0) -> Path | None:
         """Begins [s], ends [s] and lengths [m] of straight pieces of the path that two position columns describe."""
         first, second = self.series(pair[0]), self.series(pair[1])

@@ -23,6 +23,8 @@ _LARGEST = {
     "m": 12_000.0,
     "deg": 180.001,
 }
+E7 = "deg*1e-7"
+"""Receivers and flight controllers write degrees so, in whole numbers."""
 _STEEP = 0.8  # rad: no vehicle leans or climbs so for long
 _CONSTANTS = ("engine_friction_share", "engine_reference_torque")  # an engine's own, which hardly change
 _STANDING = 0.5  # m/s, under which wheels may stand still throughout

@@ -101,6 +101,8 @@ class Source(Part):
 
     def gain(self, factor: float) -> tuple[float, float]:
         """What a value is multiplied by, and what is then added, where ``factor`` leads from its unit to the channel's."""
+        if self.is_geographic:  # the scale is that of the degrees
+            return self.sign, self.sign * self.offset
         return self.sign * factor * self.scale, self.sign * factor * self.offset
 
     @property

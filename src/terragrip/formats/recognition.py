@@ -17,9 +17,10 @@ from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
-from terragrip.formats.judgement import Guess, Judge
+from terragrip.formats.judgement import E7, Guess, Judge
 from terragrip.formats.rim_units import own_name, radius_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
+from terragrip.recording.checks import PLACES
 from terragrip.recording.schema import LABELS, split_channel, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
@@ -122,7 +123,7 @@ def _left_out(
         best = max(guesses, key=lambda guess: guess.confidence, default=None)
         if best is None or channel in chosen or best.column.column in used or not best.doubt:
             continue
-        if channel == "ground_speed" or channel.startswith("wheel_speed_"):
+        if channel in ("ground_speed", *PLACES) or channel.startswith("wheel_speed_"):
             unit = f" in {best.unit}" if best.unit else ""
             yield (
                 f"{best.column.column}{unit} has the name of {_in_the_vehicle(channel, vehicle)}, but {best.doubt}: check its unit."
@@ -204,6 +205,8 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
             give = f"a rim speed in {unit}: divide the scale by the wheel's radius in m"
         else:
             shown = (f"a rim speed in {unit}, by the vehicle's radius of {radius:.4g} m",)
+    elif unit == E7:
+        entry["scale"] = factor_to(E7, "deg")
     elif unit and target and (unit != target or guess.column.stated not in (None, unit)):
         entry["unit"] = unit
     if (
@@ -274,9 +277,12 @@ def _derived_speed(
         doubt = ("" if unit else "positions in m? ") + sign
         return Proposal(entry, doubt, "", 0.5, ("two positions",), (), unit or "m")
     place = [proposals[c] for c in ("latitude", "longitude") if c in proposals]
-    if len(place) < 2 or any(one.doubt or one.entry.get("unit", "deg") != "deg" for one in place):
+    if len(place) < 2 or place[0].unit != place[1].unit:
+        return None
+    if any(one.doubt or one.entry.get("unit", "deg") != "deg" for one in place):
         return None
     entry = {"derivative_of": [one.columns[0] for one in place], "unit": "deg", "window": "2 s"}
+    entry |= {key: value for key, value in place[0].entry.items() if key == "scale"}
     return Proposal(entry, "no speed: from positions?", "", 0.5, ("latitude and longitude",), (), "deg")
 
 

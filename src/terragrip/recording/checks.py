@@ -237,6 +237,25 @@ def refuse_infinite(
         raise InputError("is infinite", file=source, place=where, hint="leave the cell empty instead")
 
 
+PLACES = {"latitude": 90.0, "longitude": 180.0}
+"""The largest degrees of each."""
+
+
+def refuse_place(name: str, values: Floats, source: str | None, channel: str | None = None) -> None:
+    """Raise InputError where values (n,) of a latitude or longitude change, and none is one in degrees; ``channel``: where ``name`` is the
+    column of another."""
+    limit, known = PLACES.get(channel or name), np.abs(values[np.isfinite(values)])
+    if limit is None or not len(known) or known.min() <= limit or not np.ptp(values[np.isfinite(values)]):
+        return
+    hint = "give it in degrees: whole numbers of 1e-7 degrees by 'scale: 1e-7' in a profile"
+    if not np.all(known == np.round(known)) and known.max() < 100 * limit:
+        hint = "give it in degrees: degrees and minutes (ddmm.mmmm) as dd + mm.mmmm/60"
+    problem = (
+        f"is {values[np.isfinite(values)][0]:.10g}, and none of its values is a {channel or name} in degrees"
+    )
+    raise InputError(problem, file=source, place=f"column {name}", hint=hint, page="formats#in-a-profile")
+
+
 def refuse_empty(name: str, source: str | None) -> None:
     """Raise InputError if a channel without any value is one that estimates need."""
     if name.startswith(_ESSENTIAL):

@@ -112,6 +112,7 @@ class Recording:
             elif is_channel(name):
                 channels[name] = numbers(name, column, time, source)
                 checks.refuse_infinite(name, channels[name], time, source, first_row=first_row)
+                checks.refuse_place(name, channels[name], source)
         return cls(time, channels, labels, source), remarks
 
     def __len__(self) -> int:

@@ -116,7 +116,7 @@ class AdhesionCurve:
             x, cost = solve(curve, free, held, many * slip, many * mean, many * weights, begin)
             best = x[int(np.argmin(cost))]
         self.free_ = tuple(free)
-        self.parameters_ = {**held, **dict(zip(free, best.tolist(), strict=True))}
+        self.parameters_: dict[str, Any] = {**held, **dict(zip(free, best.tolist(), strict=True))}
         self.bins_ = bins
         residual = mean - self.predict(slip)
         spread = mean - mean.mean()
