@@ -164,6 +164,27 @@ def test_whole_numbers_of_1e_7_degrees_are_positions(names: tuple[str, str], dou
     assert any("path of" in sentence for sentence in result["ground_speed"].evidence)
 
 
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [
+        (
+            "front axle torque [Nm]",
+            'drive_torque_fl: {from: "front axle torque [Nm]", scale: 0.5}\', and so for fr',
+        ),
+        (
+            "Drehmoment_Hinterachse",
+            "drive_torque_rl: {from: Drehmoment_Hinterachse, scale: 0.5}', and so for rr",
+        ),
+        ("rear_motor_torque", "its part times the gear ratio"),
+        ("axle2_torque", "drive_torque_2l: {from: axle2_torque"),
+    ],
+)
+def test_the_torque_of_an_axle_is_no_wheels_and_comes_with_its_line(name: str, entry: str) -> None:
+    result = _propose({"speed_mps": SPEED, name: 100 + SPEED})
+    assert not any(channel.startswith("drive_torque") for channel in result)
+    assert any(entry in note for note in result.left_out)
+
+
 def test_degrees_and_minutes_are_no_degrees() -> None:
     place = {name: 100 * np.floor(v) + 60 * (v % 1) for name, v in _place().items()}
     result = _propose({"speed": SPEED, **place})

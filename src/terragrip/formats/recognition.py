@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
+from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.judgement import E7, Guess, Judge
@@ -70,7 +71,8 @@ class Proposal:
 
 
 class Proposals(dict[str, Proposal]):
-    """Proposals by channel; ``left_out``: sentences on speeds by name that the others contradict too clearly to be proposed."""
+    """Proposals by channel; ``left_out``: sentences on speeds and places by name that the others contradict too clearly to be proposed,
+    and on torques of axles."""
 
     left_out: tuple[str, ...] = ()
 
@@ -95,7 +97,7 @@ def propose(
     judge = Judge(columns, numbers, evidence)
     ranked: dict[str, list[Guess]] = {}
     for column in columns.values():
-        for candidate in candidates_of(column):
+        for candidate in () if is_of_an_axle(column) else candidates_of(column):
             if column.column in plane and candidate.channel == "ground_speed":
                 continue
             if (guess := judge.of(candidate)) is not None:
@@ -111,7 +113,9 @@ def propose(
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
     named = {_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()}
     result = Proposals({channel: _held_against(vehicle, channel, p) for channel, p in named.items()})
-    result.left_out = tuple(_left_out(ranked, chosen, vehicle))
+    used = {column for proposal in result.values() for column in proposal.columns}
+    unused = [column for name, column in columns.items() if name not in used]
+    result.left_out = (*_left_out(ranked, chosen, vehicle), *axle_torque_hints(unused, vehicle))
     return result
 
 

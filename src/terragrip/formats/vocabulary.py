@@ -38,8 +38,8 @@ MEANINGS: dict[str, str] = {
     "distance": "distance odometer",
     "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow",
     # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle rad theoretical theorique theoretisch theoretische "
-    "teorica teorico radumfangs",
+    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle achse essieu eje assale rad theoretical theorique "
+    "theoretisch theoretische teorica teorico radumfangs",
     "motor": "motor moteur motore antrieb antriebs esc",
     "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",

@@ -1,0 +1,60 @@
+"""The torque of a whole axle in a log: no wheel's, and how a profile gives it to the wheels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from terragrip.formats.candidates import Column
+from terragrip.units import factor_to
+
+if TYPE_CHECKING:
+    from terragrip.vehicle import Vehicle
+
+_AXLE = frozenset({"axle", "achse", "vorderachse", "hinterachse", "essieu", "eje", "assale"})
+_ENDS = {"front": "f", "rear": "r", "middle": "m"}
+
+
+def is_of_an_axle(column: Column) -> bool:
+    """Whether a column is, by its name, a torque of both wheels of an axle."""
+    name = column.name
+    if (
+        not name.has("torque")
+        or column.kind not in (None, "torque")
+        or name.has("other", "command", "statistic")
+    ):
+        return False
+    return (not name.wheel and name.has(*_ENDS)) or (
+        not _AXLE.isdisjoint(name.words) and name.wheel.isdigit()
+    )
+
+
+def axle_torque_hints(columns: Iterable[Column], vehicle: Vehicle | None) -> Iterator[str]:
+    """For each column that is the torque of an axle, how to give it to its wheels: those of the ``vehicle``, where it is known."""
+    for column in filter(is_of_an_axle, columns):
+        wheels = _wheels_of(column, vehicle)
+        ratio = " times the gear ratio" if column.name.has("motor") else ""
+        own = column.unit is None or factor_to(column.unit, "N m") == 1.0
+        unit = "" if own else f", unit: {column.unit}"
+        plain = column.column if column.column.isidentifier() else f'"{column.column}"'
+        share = f"{1 / len(wheels):.3g}"
+        entries = f"'drive_torque_{wheels[0]}: {{from: {plain}, scale: {share}{unit}}}'"
+        others = f", and so for {', '.join(wheels[1:])}" if len(wheels) > 1 else ""
+        yield (
+            f"{column.column} is by its name the torque of an axle, which a differential shares evenly: give each wheel its part{ratio} "
+            f"in the profile, {entries}{others}. Only their mean adhesion is then known."
+        )
+
+
+def _wheels_of(column: Column, vehicle: Vehicle | None) -> tuple[str, ...]:
+    """The wheels of the axle that a column names: of a vehicle by the axle's name or place, else the usual names."""
+    end = next((end for end in _ENDS if column.name.has(end)), "")
+    if vehicle is None:
+        letter = _ENDS.get(end, column.name.wheel)
+        return f"{letter}l", f"{letter}r"
+    axles = list(vehicle.axles.items())
+    place = {"front": 0, "rear": -1, "middle": len(axles) // 2}.get(end)
+    if place is None:
+        place = min(int(column.name.wheel), len(axles)) - 1
+    named = [axle for name, axle in axles if end and end in name.lower()]
+    return tuple((named or [axles[place][1]])[0].wheels)
