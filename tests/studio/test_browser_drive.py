@@ -105,6 +105,11 @@ def test_notes_of_the_estimates_are_shown(page: Any, served: Served, folder: Pat
     open_drive(page, served, "noted.parquet")
     page.click(".run-notes summary")
     assert "nothing is towed" in page.inner_text(".run-notes ul")
+    for width in (1280, 390):  # it hung out of the window on the left
+        page.set_viewport_size({"width": width, "height": 800})
+        box = page.locator(".run-notes ul").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
 
 
 def test_a_replaced_run_is_shown_anew_and_a_removed_one_is_said(

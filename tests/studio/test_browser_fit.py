@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import terragrip as tg
 from served import NEEDS, Served
+from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
 from terragrip.simulation import Scenario
 from terragrip.soil.bins import BY_SLIP, BinSettings
@@ -50,6 +52,18 @@ def test_bins_by_slip_are_those_of_terragrip_soils_by_slip(page: Any, served: Se
     np.testing.assert_allclose(fitted, wanted, rtol=1e-9)  # the fit takes what is shown
     page.select_option("#bins-by", "pull")
     page.wait_for_function(f"n => ({BINS})().length === n", arg=len(by_pull))
+
+
+def test_estimates_without_adhesion_say_so(page: Any, served: Served, folder: Path) -> None:
+    """They showed the prototype, without a word, and an undo of what nobody had done."""
+    table = Estimates.read(folder / "estimates.parquet")
+    kept = {
+        k: v for k, v in table.columns.items() if not k.startswith(("adhesion", "net_traction", "efficiency"))
+    }
+    dataclasses.replace(table, columns=kept).write(folder / "slip.parquet")
+    page.goto(f"{served.url}/#/fit?path=slip.parquet")
+    page.wait_for_selector(".note.error:has-text('slip.parquet: has slip but no adhesion')")
+    assert page.locator("button", has_text="Undo").is_disabled()
 
 
 def test_residuals_are_bins_less_the_curve(page: Any, served: Served) -> None:

@@ -101,6 +101,25 @@ def test_a_long_run_shows_every_extreme_whatever_the_window(made: Path) -> None:
         assert np.nanmax(high) == np.nanmax(limit[wide])
 
 
+@pytest.mark.parametrize("width", [20, 500])
+def test_nothing_is_shown_in_a_hole_of_the_log(made: Path, width: int) -> None:
+    """A quarter of an hour without rows was a bar of the last value, as if it had been measured."""
+    short = Estimates.read(made / RUN)
+    time = np.r_[np.arange(0.0, 100.0), np.arange(1000.0, 1100.0)]
+    table = Estimates(time, {"ground_speed": np.ones(200)}, short.event_codes[:200], {}, short.about)
+    for axis, name in (("time", "axis:time"), ("distance", "axis:distance")):
+        place = Shown(table).along(axis)
+        cut, at, (speed, along) = Shown(table).window(
+            None, ["ground_speed", name], 0.0, place[-1], width, axis
+        )
+        assert cut == (width == 20)
+        np.testing.assert_allclose(along[::2] if cut else along, at[::2] if cut else at)
+        (hole,) = np.flatnonzero(np.isnan(speed[:: 1 + cut])) * (1 + cut)
+        assert at[hole] == place[99]
+        assert at[hole + 1 + cut] == place[100]
+        assert np.all(np.diff(at) >= 0)
+
+
 def test_nis_is_judged_by_chi_squared_of_the_channels_taken() -> None:
     """Rows of an honest filter with four or five channels, or none: the mean is about 1, 95 % of it in the band."""
     rng = np.random.default_rng(5)
@@ -300,6 +319,7 @@ def test_a_log_that_needs_a_profile_shows_its_measurements(client: TestClient, f
     (folder / "foreign.yaml").write_text(text)
     recording = tg.read(folder / "foreign.csv", profile=folder / "foreign.yaml")
     tg.estimate(recording, tg.Vehicle.load(folder / "vehicle.yaml")).write(folder / "foreign.parquet")
+    (folder / "foreign.yaml").unlink()  # one that comes with Terragrip is in no folder either
     about = client.get("/api/drive", params={"path": "foreign.parquet"}).json()
     assert about["recording"] == "foreign.csv"
     assert "ground_speed" in about["measured"]

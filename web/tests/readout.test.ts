@@ -17,6 +17,12 @@ describe("the value under the cursor", () => {
     expect(nearestKnown([0, 1, 2, 3, 4, 5], known(values), 1.9, 2)).toBe(0);
     expect(nearestKnown([0, 1, 2, 3, 4, 5], known(values), 4.5, 0.1)).toBe(5);
   });
+  it("is none in a hole of the log, whether rows were cut or not", () => {
+    const hole = [0, 1, 2, 2, 900, 901];
+    for (const at of [300, 800]) expect(valueAt(hole, [3, 3, 3, NaN, 3, 3], undefined, undefined, at, false, 0.5)).toBe("–");
+    const buckets = [0, 1, 2, 2.5, 3, 450, 900, 901];
+    expect(valueAt(buckets, [3, 3, 3, 3, NaN, NaN, 3, 3], undefined, undefined, 420, true, 0.5)).toBe("–");
+  });
 });
 
 describe("a link", () => {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,7 @@ def radii(table: Estimates) -> dict[str, float]:
 
 def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> tuple[Path, Recording] | None:
     """The recording that the estimates were made from, where the folder holds it unchanged: same SHA-256, whatever its name now,
-    and rows at the same times. A log that needs a profile is read by those of the folder.
+    and rows at the same times. A log that needed a profile is read by the one that the estimates hold, wherever its file is now.
 
     The folder is searched the first time, and again where `search` asks for it: a walk through all of it, so not for every request.
     """
@@ -69,24 +70,14 @@ def recording_of(studio: Studio, table: Estimates, *, search: bool = False) -> t
         return None
     # Estimates of a part of a recording are not those of the whole.
     key = (wanted, len(table), *(table.time[[0, -1]].tolist() if len(table) else ()))
-    origin = studio.origins.get(key)
-    if origin is not None:
-        path, profile = origin
-        if path.is_file() and studio.fingerprints.get(path) == wanted:
-            with contextlib.suppress(InputError):  # the profile is gone, or was changed
-                recording = studio.recordings.get(path, profile)
-                if _is_of(recording, table):
-                    return path, recording
-    elif key in studio.origins and not search:
+    place = studio.origins.get(key)
+    if place is None and key in studio.origins and not search:
         return None
-    items = studio.folder.items()
-    place = _find(studio, items, name, wanted)
-    result = None if place is None else _read(studio, items, place, table)
-    if place is None or result is None:
-        studio.origins[key] = None
-        return None
-    studio.origins[key] = (place, result[0])
-    return place, result[1]
+    if place is None or not place.is_file() or studio.fingerprints.get(place) != wanted:
+        place = _find(studio, studio.folder.items(), name, wanted)
+    recording = None if place is None else _read(studio, place, table)
+    studio.origins[key] = None if recording is None else place
+    return None if place is None or recording is None else (place, recording)
 
 
 def _find(studio: Studio, items: Sequence[Item], name: str, wanted: str) -> Path | None:
@@ -96,21 +87,14 @@ def _find(studio: Studio, items: Sequence[Item], name: str, wanted: str) -> Path
     return next((path for path in paths if studio.fingerprints.get(path) == wanted), None)
 
 
-def _read(
-    studio: Studio, items: Sequence[Item], path: Path, table: Estimates
-) -> tuple[str, Recording] | None:
-    """The log as it was estimated, and the profile it needs (empty: none): that which gives the most channels at the table's times."""
-    read = []
-    for profile in ["", *(str(studio.folder.file(item.path)) for item in items if item.kind == "profile")]:
-        with contextlib.suppress(InputError):  # not this profile
-            recording = studio.recordings.get(path, profile)
-            if _is_of(recording, table):
-                read.append((profile, recording))
-    return max(read, key=lambda one: len(one[1].channels), default=None)
-
-
-def _is_of(recording: Recording, table: Estimates) -> bool:
-    return len(recording) == len(table) and np.array_equal(recording.time, table.time)
+def _read(studio: Studio, path: Path, table: Estimates) -> Recording | None:
+    """The log as it was estimated; None where it is now read otherwise, or was joined with others."""
+    profile = table.about["recording"].get("profile")
+    with contextlib.suppress(InputError):
+        recording = studio.recordings.get(path, *([json.dumps(profile)] if isinstance(profile, dict) else []))
+        if len(recording) == len(table) and np.array_equal(recording.time, table.time):
+            return recording
+    return None
 
 
 def sample(table: Estimates, recording: Recording | None, time: float) -> dict[str, Any]:

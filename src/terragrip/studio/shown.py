@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
+from terragrip.recording.stretches import gaps
 from terragrip.studio.formulas import evaluate, names
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
 
@@ -50,6 +51,7 @@ class Shown:
         self._extremes: dict[str, Extremes] = {}
         self._nis: dict[str, Floats] = {}
         self._distance: Floats | None = None
+        self._after_hole = np.flatnonzero(gaps(table.time)) + 1
         self._worked_out: OrderedDict[str, Floats] = OrderedDict()
 
     def along(self, axis: Axis) -> Floats:
@@ -114,29 +116,34 @@ class Shown:
     ) -> tuple[bool, Floats, list[Floats]]:
         """Columns between two places on an axis, cut to `width` buckets: (whether cut, places, columns), all of one length.
 
-        Where it is cut, a bucket is two points: its smallest and its largest value, so that no spike is lost. Raises InputError on a
-        name that is not there.
+        Where it is cut, a bucket is two points: its smallest and its largest value, so that no spike is lost. A hole in the log is a
+        point (cut: a bucket) without values where it begins: nothing is drawn across it. Raises InputError on a name that is not there.
         """
         time = self.along(axis)
         starts = buckets(time, start, end, width)
         first, last = int(starts[0]), int(starts[-1])
         cut = len(starts) - 1 < last - first
         long = are_long(last - first, width)
+        holes = self._after_hole[(self._after_hole > first) & (self._after_hole < last)]
+        if cut:  # what is shorter than a bucket cannot be seen
+            holes = holes[time[holes] - time[holes - 1] > (end - start) / width]
+        at = np.searchsorted(starts, holes) if cut else holes - first
         result = []
         for name in names:
             values = self._values(recording, name)
+            nothing = values(slice(None))[holes - 1] if name in PLACES else np.nan
             if not cut:
-                result.append(values(slice(first, last)).astype(np.float64))
+                result.append(np.insert(values(slice(first, last)).astype(np.float64), at, nothing))
                 continue
             if not long:
                 low, high = extremes(values(slice(first, last)), starts - first)
             else:
                 low, high = self._blocks(name, values).of(values, starts)
             pair = {"low": (low, low), "high": (high, high)}.get(name.rpartition(":")[2], (low, high))
-            result.append(np.stack(pair, axis=1).ravel())
+            result.append(np.stack([np.insert(one, at, nothing) for one in pair], axis=1).ravel())
         if not cut:
-            return False, time[first:last], result
-        begin = time[starts[:-1]]
+            return False, np.insert(time[first:last], at, time[holes - 1]), result
+        begin = np.insert(time[starts[:-1]], at, time[holes - 1])
         following = np.r_[begin[1:], time[last - 1]]
         return True, np.stack((begin, (begin + following) / 2), axis=1).ravel(), result
 

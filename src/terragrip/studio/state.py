@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from importlib import import_module
 from importlib.util import find_spec
@@ -37,9 +38,10 @@ def _estimates(path: Path) -> Estimates:
 
 
 def _recording(path: Path, profile: str = "") -> Recording:
-    from terragrip.formats import read
+    """A log read by a profile's content (JSON), as estimates hold it."""
+    from terragrip.formats import Profile, read
 
-    return read(path, profile or None)
+    return read(path, Profile.from_dict(json.loads(profile)) if profile else None)
 
 
 def _map(path: Path) -> MapFile:
@@ -71,8 +73,8 @@ class Studio:
         self.maps: Tables[MapFile] = Tables(_map)
         self.logs: Tables[LogPreview] = Tables(preview)
         self.fingerprints: Tables[str] = Tables(sha256, MOST)
-        # by SHA-256, rows and times: the recording and the profile that reads it, None where the folder does not hold it
-        self.origins: dict[tuple[str | float, ...], tuple[Path, str] | None] = {}
+        # by SHA-256, rows and times: the recording, None where the folder does not hold it
+        self.origins: dict[tuple[str | float, ...], Path | None] = {}
         self.upload_limit, self.live = upload_limit, live
 
     def prepare_maps(self) -> None:

@@ -46,7 +46,7 @@ export function valueAt(times: ArrayLike<number>, values: Values, low: Values | 
   return isKnown(from) && isKnown(to) ? `${digits(v)} ± ${digits((to - from) / 2, 2)}` : digits(v);
 }
 
-/** The place of the known sample nearest to a time, -1 where none is within `near`. */
+/** The place of the known sample nearest to a time, -1 where none is within `near`, or within the step of its samples. */
 export function nearestKnown(times: ArrayLike<number>, known: (i: number) => boolean, time: number, near: number): number {
   const low = firstFrom(times, time);
   let best = -1;
@@ -54,7 +54,7 @@ export function nearestKnown(times: ArrayLike<number>, known: (i: number) => boo
   for (const step of [-1, 1]) {
     for (let i = step < 0 ? low - 1 : low; i >= 0 && i < times.length; i += step) {
       const apart = Math.abs((times[i] as number) - time);
-      if (apart > Math.max(near, spacing(times, low)) || apart >= away) break;
+      if (apart > Math.max(near, spacing(times, i, step)) || apart >= away) break;
       if (!known(i)) continue;
       [best, away] = [i, apart];
       break;
@@ -63,8 +63,7 @@ export function nearestKnown(times: ArrayLike<number>, known: (i: number) => boo
   return best;
 }
 
-/** Seconds between the samples about a place. */
-function spacing(times: ArrayLike<number>, i: number): number {
-  const k = Math.min(Math.max(i, 1), times.length - 1);
-  return times.length > 1 ? (times[k] as number) - (times[k - 1] as number) : 0;
+/** How far the sample beyond this one is, else the one before it: in a hole of the log the rows at its ends are not of the cursor's place. */
+function spacing(times: ArrayLike<number>, i: number, step: number): number {
+  return Math.abs(((times[i + step] ?? times[i - step] ?? times[i]) as number) - (times[i] as number));
 }

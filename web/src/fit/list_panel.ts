@@ -2,7 +2,7 @@
 
 import { get, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
-import { tried } from "../ui/notes";
+import { note, tried } from "../ui/notes";
 import { onceReleased } from "../ui/press";
 import type { Curve, Soil, State } from "./state";
 
@@ -171,7 +171,10 @@ export class ListPanel {
       const key = `${path}#${one.name}`;
       this.state.soils = this.state.soils.filter((soil) => soil.key !== key);
       if (one.model && one.parameters) this.state.addCurve(one.model, one.parameters, one.name, one.source || path);
-      if (!one.bins?.length && !one.points?.slip.length) continue;
+      if (!one.bins?.length && !one.points?.slip.length) {
+        if (one.note) note(`${path}: ${one.note}`, "error");
+        continue;
+      }
       this.state.soils.push({
         key,
         path,

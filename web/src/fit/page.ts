@@ -84,7 +84,7 @@ export const page: Page = (main, { notices, query }) => {
     state.models = (await tried(() => get<Model[]>("models"))) ?? [];
     if (!state.takeUp()) {
       state.addCurve("exponential", undefined, "prototype", "paper, eq. 8");
-      state.commit();
+      state.begin();
     }
     state.changed("all");
     await reload();

@@ -131,6 +131,11 @@ export class State {
     this.settled = now;
   }
 
+  /** What is shown is the beginning, behind which nothing can be undone. */
+  begin(): void {
+    this.settled = JSON.stringify(this.kept);
+  }
+
   undo(): boolean {
     return this.step(this.past, this.future);
   }

@@ -11,16 +11,17 @@ import { soilAt, type Legend } from "./quantities";
 
 const [TRACK, RIM, BRUSHED] = [5, 8, 16]; // pixels, as on the page
 
-/** Seconds without a position that part a track. */
-const APART = 5;
+/** Without a position for so many seconds, and so many usual steps, a track is parted. */
+const [APART, STEPS] = [5, 3];
 
 /** Stretches of one shade and one ink are one line: a map of 20 000 features would stutter. A gap in time is not bridged. */
 export function linesOf({ data }: Columns, shade: (i: number) => string, ink: (i: number) => number): GeoJSON.Feature[] {
   const [time, lon, lat] = data as [Float64Array, Float64Array, Float64Array];
   const features: GeoJSON.Feature[] = [];
+  const apart = Math.max(APART, STEPS * median(Array.from(time.subarray(1), (t, i) => t - (time[i] as number))));
   let from = 0;
   for (let i = 1; i <= time.length; i++) {
-    const gap = i === time.length || (time[i] as number) - (time[i - 1] as number) > APART;
+    const gap = i === time.length || (time[i] as number) - (time[i - 1] as number) > apart;
     if (!gap && shade(i) === shade(from) && ink(i) === ink(from)) continue;
     const line: number[][] = [];
     for (let k = from; k <= (gap ? i - 1 : i); k++) line.push([lon[k] as number, lat[k] as number]);
@@ -28,6 +29,10 @@ export function linesOf({ data }: Columns, shade: (i: number) => string, ink: (i
     from = i;
   }
   return features;
+}
+
+function median(values: number[]): number {
+  return values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
 }
 
 /** The points of the track between two times (null: all) as CSV: time, place, the quantity in the unit that is shown, soil, event. */

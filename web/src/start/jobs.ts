@@ -106,7 +106,7 @@ export class JobList {
       h("span", { class: "what" }, `${NAMES[job.kind] ?? job.kind}: ${job.title} → `, output),
       going ? bar : h("span", { class: `state ${job.state}` }, job.state),
       going ? h("button", { type: "button", "data-key": `cancel ${job.id}`, click: cancel }, "Cancel") : null,
-      !going && job.text ? h("details", { open: failed }, h("summary", {}, failed ? "Why" : "Summary"), h("pre", { tabindex: "0" }, job.text)) : null,
+      !going && job.text ? h("details", { open: failed }, h("summary", {}, failed ? "Why" : "Summary"), h("pre", { tabindex: "0", class: failed ? "prose" : null }, job.text)) : null,
       h("details", {}, h("summary", {}, "Command line"), commandLine(job.command)),
     ];
   }
