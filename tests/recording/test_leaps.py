@@ -98,3 +98,14 @@ def test_a_tool_that_comes_in_or_out_at_once_and_a_vehicle_that_coasts_are_no_er
     coasting = drive(vehicle, np.zeros(len(TIME)), coasting=(60, 60.6))
     del coasting["drawbar_force"]
     assert notes(coasting, vehicle) == []
+
+
+def test_a_wheel_on_rough_ground_whose_soil_changes_is_no_moved_zero(vehicle: Vehicle) -> None:
+    """A wheel's torque leaps all the time where the ground is rough; there resistance falls by .04, and all torques with it."""
+    columns = drive(vehicle)
+    falls = 0.04 * vehicle.mass * G * np.clip((TIME - 59.9) / 0.3, 0, 1) * RADIUS / 4  # N m a wheel
+    shifts = np.random.default_rng(3).normal(0, 4.0, (4, len(TIME))) * ((TIME > 55) & (TIME < 75))
+    near = np.abs(TIME - 59.97) < 0.2
+    shifts[:, near] = 6 * np.outer([-1, 1, 0, 0], np.sign(TIME[near] - 59.97))  # from wheel to wheel
+    right = columns | {name: columns[name] - falls + own for name, own in zip(TORQUES, shifts, strict=True)}
+    assert notes(right, vehicle) == []
