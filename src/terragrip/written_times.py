@@ -11,7 +11,7 @@ import numpy.typing as npt
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:(?:[.,]|:(?=\d{3}))(?P<part>\d{1,9}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
 _TIME = re.compile(_CLOCK)
 _NAMED = (
-    re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>\d{{4}}),?[ T]+{_CLOCK}"),
+    re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>(?:\d\d)?\d\d),?[ T]+{_CLOCK}"),
     re.compile(rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}Z?"),
 )
 _EITHER = re.compile(
@@ -123,7 +123,8 @@ def _day(match: re.Match[str] | None, order: str | None) -> str:
         day, month = _pair(match) if order == ORDERS[0] else _pair(match)[::-1]
     else:
         day, month = int(match["day"]), int(match["month"])
-    return f"{match['year']}-{month:02d}-{day:02d}"
+    century = "20" * (len(match["year"]) == 2)  # 13.4.24
+    return f"{century}{match['year']}-{month:02d}-{day:02d}"
 
 
 def _without_midnights(seconds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

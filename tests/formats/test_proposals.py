@@ -413,6 +413,16 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
     assert "twist.twist.linear.x" in text
 
 
+def test_a_profile_of_four_wheels_does_not_fit_a_rover_of_six(tmp_path: Path) -> None:
+    """'A profile fits: --profile ros2-4wd' led to a refusal for want of wheel_speed_ml; the joints named drive were no wheels."""
+    columns = {"/vio/odometry.twist.twist.linear.x": SPEED}
+    for wheel in ("left_front", "right_front", "left_middle", "right_middle", "left_rear", "right_rear"):
+        columns[f"/joint_states.velocity.drive_{wheel}_joint"] = 5 * SPEED
+    inspection = inspect(_log(tmp_path / "rover.csv", columns))
+    assert {"wheel_speed_fl", "wheel_speed_ml", "wheel_speed_rr"} <= inspection.recognised.keys()
+    assert inspection.fitting == ()
+
+
 def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newtons() -> None:
     """The first of the six was, surely: the vertical one of a cell that lists it first."""
     name = "/drawbar/wrench.wrench.{}.{}"
@@ -454,6 +464,13 @@ def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newto
         ("Accel_magnitude", None),
         ("PTO_Speed_rpm", None),
         ("FuelRate_Lph", None),
+        ("/joint_states.velocity.drive_left_middle_joint", "wheel_speed_ml"),
+        ("/joint_states.velocity.rocker_left_joint", None),
+        ("/joint_states.effort.bogie_right_joint", None),
+        ("M_Antrieb_VL [Nm]", "drive_torque_fl"),
+        ("M_Brems_VL [Nm]", None),
+        ("Längsbeschleunigung [m/s²]", "acceleration_x"),
+        ("Querneigung [°]", "roll"),
     ],
 )
 def test_names_of_others(name: str, channel: str | None) -> None:

@@ -49,6 +49,17 @@ def test_a_day_and_a_time_in_whole_seconds_in_two_columns(tmp_path: Path, day: s
     assert np.array_equal(recording.time, SECONDS)
 
 
+def test_a_german_stamp_of_two_digits_for_the_year_is_the_time(tmp_path: Path) -> None:
+    """'No time column was found', of a column named Zeitstempel."""
+    log = log_of(
+        tmp_path / "log.csv", Zeitstempel=times_from("2024-04-03 23:55:00").strftime("%d.%m.%y %H:%M:%S,5")
+    )
+    assert "time: {from: Zeitstempel, zero: first}" in inspect(log).profile
+    recording = tg.read(log, by_profile("Zeitstempel"))
+    assert np.array_equal(recording.time, SECONDS)
+    assert recording.start == pd.Timestamp("2024-04-03 23:55:00.5").timestamp()
+
+
 @pytest.mark.parametrize(("unit", "period"), [("s", 86_400), ("ms", 86_400_000), ("h", 24.0), ("s", 604_800)])
 @pytest.mark.parametrize("blocks", [False, True])
 def test_a_clock_that_begins_anew_at_midnight_counts_on(

@@ -80,6 +80,8 @@ def columns_of(
                 name = replace(name, concepts=name.concepts | other.concepts, wheel=other.wheel)
         if {"twist", "pose"} & set(name.words) and _root(column) in odometry:
             name = replace(name, concepts=name.concepts | {"odometry"})
+        if is_channel(column) or {"drive", "joint"} <= set(name.words):  # behind the gear
+            name = replace(name, concepts=name.concepts - {"motor"})
         if _WITHOUT_WHEELS & set(name.words) and not _FUSED & set(name.words):
             name = replace(name, concepts=name.concepts - {"odometry"})
         if (
@@ -134,8 +136,7 @@ def candidates_of(column: Column) -> list[Candidate]:
     standard = _on_the_bus().get(last)
     if standard is not None:
         return [Candidate(standard, own, 0.95, ON_THE_BUS)]
-    ours = column.name.words[:2] == ("drive", "torque")  # "drive" alone may be short for a driveshaft
-    if column.name.has("command", "statistic", "change") or (column.name.has("other") and not ours):
+    if column.name.has("command", "statistic", "change", "other"):
         return []
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
         result = ways(column)
@@ -153,7 +154,7 @@ def _of_wheels(column: Column) -> list[Hint]:
         or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate")
     ):
         return []
-    if name.has("torque") or (name.has("wheel") and column.kind == "torque"):
+    if name.has("torque") or column.kind == "torque":
         return [(f"drive_torque_{name.wheel}", 0.9 if name.has("wheel") else 0.8, "a torque and a wheel")]
     if name.has("current") or column.kind == "current":
         return [(f"drive_torque_{name.wheel}", 0.75, "a current and a wheel")]

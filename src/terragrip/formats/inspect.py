@@ -147,6 +147,11 @@ def inspect(
     seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
+    wheels = {channel for channel in proposals if channel.startswith("wheel_speed_")}
+    if (
+        wheels - fits.channels and wheels & fits.channels
+    ):  # a robot's profile of four wheels, of six in the log
+        fits = Fit()
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
     if seen.stamp is not None:

@@ -32,7 +32,9 @@ SURE = 0.7
 """Confidence from which a proposal carries no question mark."""
 
 _OF_WHEELS = ("wheel_speed", "drive_torque")
-_EITHER_SIDE = re.compile(r"^(?!.*mot).*antrieb", re.IGNORECASE)  # the drive: before the gear or behind it
+_EITHER_SIDE = re.compile(
+    r"^(?!.*mot).*(antrieb|drive)", re.IGNORECASE
+)  # the drive: before the gear or behind it
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ MEANINGS: dict[str, str] = {
     "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
     "gyro": "gyroscope gyro gyr",
     "rate": "rate angular turn",
-    "pitch": "pitch assiette nick nickwinkel tangage cabeceo beccheggio",
-    "roll": "roll bank wank wankwinkel roulis balanceo rollio",
+    "pitch": "pitch assiette nick nickwinkel neigung tangage cabeceo beccheggio",
+    "roll": "roll bank wank wankwinkel querneigung roulis balanceo rollio",
     "yaw": "yaw psi gier lacet imbardata",
     "heading": "heading hdg course bearing azimuth cog compass",
     "latitude": "latitude breitengrad",
@@ -36,11 +36,12 @@ MEANINGS: dict[str, str] = {
     "force": "force kraft fuerza forza",
     "mass": "mass weight masse gewicht poids peso massa",
     "distance": "distance odometer",
-    "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow",
+    "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow "
+    "zeitstempel horodatage",
     # what it is of
     "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle achse essieu eje assale rad theoretical theorique "
     "theoretisch theoretische teorica teorico radumfangs",
-    "motor": "motor moteur motore antrieb antriebs esc",
+    "motor": "motor moteur motore antrieb antriebs esc drive",
     "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",
     "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd avancement",
@@ -50,7 +51,7 @@ MEANINGS: dict[str, str] = {
     "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
     "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
     "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel "
-    "getriebe",
+    "getriebe rocker bogie suspension brems bremse bremsen frein freno",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
@@ -60,8 +61,8 @@ MEANINGS: dict[str, str] = {
     "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
     "bias deviation scale ratio gain residual label relative rlv rel magnitude norm total wear",
     # along which axis
-    "longitudinal": "longitudinal forward fwd",
-    "lateral": "lateral side sideways transverse",
+    "longitudinal": "longitudinal forward fwd laengs",
+    "lateral": "lateral side sideways transverse quer",
     "vertical": "vertical vert down up climb sink",
     "east": "east easting",
     "north": "north northing",

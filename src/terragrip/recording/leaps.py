@@ -127,7 +127,9 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
     leaps = calm[3:] - calm[:-3]
     rows = (np.abs(leaps) > _SURE * MAD_TO_SD * median(np.abs(leaps))) & (np.diff(when)[2:-2] <= _SLOWEST)
     rows &= np.abs(steps[2:-2] - leaps) < _HALF * np.abs(leaps)
-    at = when[3:-2]  # on rough ground, or pulling hard, a wheel's torque leaps more than in the rest of the drive
+    at = when[
+        3:-2
+    ]  # on rough ground, or pulling hard, a wheel's torque leaps more than in the rest of the drive
     for k in np.flatnonzero(rows):
         first, last = np.searchsorted(at, (at[k] - LONG, at[k] + LONG))
         rows[k] = np.abs(leaps[k]) > _SURE * MAD_TO_SD * median(np.abs(leaps[first:last]))
