@@ -272,6 +272,16 @@ static void mirror(tg_input *u, int32_t wheels)
     u->slope = -u->slope;
 }
 
+/* How fast the wheels' hubs go in the mean, in a turn on the spot too. */
+static tg_real speed_of_hubs(const tg_estimator *e)
+{
+    const int32_t n = e->settings.machine.wheels;
+    const tg_real v = e->belief.x[n + 1], yaw = (tg_real)e->direction * e->yaw_rate;
+    tg_real speed = 0;
+    for (int32_t i = 0; i < n; i++) speed += tgi_fabs(v - e->settings.wheel_side[i] * yaw);
+    return speed / (tg_real)n;
+}
+
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
 {
     if (!e || !sample || !out) return TG_BAD_ARGUMENT;
@@ -304,7 +314,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     report_adaptation(e, out->value);
     const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
-    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : travelled * dt); /* nothing shows how far it went in a gap */
+    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);

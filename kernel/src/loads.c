@@ -93,6 +93,21 @@ static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_
         if (!measured[k]) load[k] += (rest - computed) * s->load_share[k] / share;
 }
 
+/* A tyre's own resistance opposes its wheel, which the model takes to turn with the travel: of one that turns against it, as on the inner
+ * side of a turn on the spot, twice the resistance is added to the torque. */
+static void turn_tyres(const tg_estimator *e, tg_drive *drive)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real d = (tg_real)e->direction;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        const tg_real back = -d * s->rolling_radius[i] * e->soon[i].value / s->standstill_speed;
+        if (!(back > 0)) continue;
+        const tg_real resistance = 2 * d * (back < 1 ? back : 1) * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];
+        drive->torque[i] += resistance;
+        drive->mean_torque[i] += resistance;
+    }
+}
+
 /* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; added
  * to it a payload beyond the file's mass, with its own shares and height, and the load on the hitch. A wheel keeps at
  * least 2 % of its static load: the model divides by it. */
@@ -126,4 +141,5 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
         tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);
         drive->load[i] = wheel > least ? wheel : least;
     }
+    turn_tyres(e, drive);
 }

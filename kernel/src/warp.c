@@ -6,56 +6,71 @@
  * Errors of the ground speed are equal on all wheels and drop out; the variance by those of the wheel speeds is known. */
 #include "estimator.h"
 
-#define TG_TRENDS 3 /* equal, along, across */
+#define TG_TRENDS 3 /* equal, along, across; in a turn also the middle against the ends */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
-/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what they leave. More wheels than trends
- * leave patterns. */
-void tgi_place_trends(const tg_settings *s, tgi_constants *c)
+/* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what the first three leave. More wheels than
+ * those leave patterns. */
+static int32_t find_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
-    tg_real weight[TG_MAX_WHEELS], trends[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS][TG_MAX_WHEELS] = {{0}}, whole = 0, longest = 0, work = 0;
-    int32_t count = 0, driven = 0, unpowered = 0;
+    tg_real trends[TG_TRENDS + 1][TG_MAX_WHEELS] = {{0}}, by_trend[TG_TRENDS + 1][TG_MAX_WHEELS] = {{0}}, longest = 0;
+    int32_t count = 0, kept = 0;
     for (int32_t k = 0; k < s->axles; k++) longest = tgi_max(longest, tgi_fabs(s->load_transfer[k]));
-    for (int32_t i = 0; i < n; i++) {
-        c->inverse_radius[i] = 1 / s->rolling_radius[i];
-        c->pulls[i] = s->driven[i] ? 1 : 0;
-        driven += s->driven[i] != 0;
-        unpowered |= s->driven[i] && !c->watched[i];
-        whole += weight[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
-    }
-    for (int32_t a = 0; a < TG_TRENDS && driven; a++) {
+    for (int32_t a = 0; a <= TG_TRENDS; a++) {
         tg_real *const trend = trends[count], square = 0;
         for (int32_t i = 0; i < n; i++) {
             const tg_real along = longest > 0 ? s->load_transfer[s->wheel_axle[i]] / longest : 0;
-            trend[i] = a == 0 ? 1 : a == 1 ? along : (tg_real)c->side[i];
+            trend[i] = a == 0 ? 1 : a == 1 ? along : a == 2 ? (tg_real)c->side[i] : along * along;
         }
         for (int32_t b = 0; b < count; b++) {
             tg_real share = 0;
             for (int32_t i = 0; i < n; i++) share += by_trend[b][i] * trend[i];
             for (int32_t i = 0; i < n; i++) trend[i] -= share * trends[b][i];
         }
-        for (int32_t i = 0; i < n; i++) square += weight[i] / whole * tgi_square(trend[i]);
+        for (int32_t i = 0; i < n; i++) square += c->at_rest[i] * tgi_square(trend[i]);
         for (int32_t i = 0; i < n; i++) {
             trend[i] *= square > TG_IN_LINE && s->driven[i] ? 1 / tgi_sqrt(square) : 0;
-            by_trend[count][i] = weight[i] / whole * trend[i];
+            by_trend[count][i] = c->at_rest[i] * trend[i];
         }
         count += square > TG_IN_LINE;
+        if (a < TG_TRENDS) kept = count;
     }
-    for (int32_t j = 0; j < n && driven; j++) {
-        c->at_rest[j] = weight[j] / whole;
-        c->watched_share[j] = c->watched[j] ? c->at_rest[j] : 0;
-        work += c->watched_share[j];
+    for (int32_t j = 0; j < n; j++) {
+        c->middle[j] = count > kept ? trends[kept][j] : 0;
         for (int32_t i = 0; i < n; i++) {
             c->beyond[j][i] = i == j;
-            for (int32_t a = 0; a < count; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
+            for (int32_t a = 0; a < kept; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
             c->beyond[j][i] *= c->pulls[i];
         }
     }
-    for (int32_t j = 0; j < n && work > 0; j++) c->watched_share[j] /= work;
-    c->work = work > 0 ? work : 1;
+    return kept;
+}
+
+void tgi_place_trends(const tg_settings *s, tgi_constants *c)
+{
+    const int32_t n = s->machine.wheels;
+    tg_real whole = 0, work = 0;
+    int32_t driven = 0, unpowered = 0;
+    for (int32_t i = 0; i < n; i++) {
+        c->inverse_radius[i] = 1 / s->rolling_radius[i];
+        c->pulls[i] = s->driven[i] ? 1 : 0;
+        driven += s->driven[i] != 0;
+        unpowered |= s->driven[i] && !c->watched[i];
+        whole += c->at_rest[i] = s->driven[i] ? s->load_share[s->wheel_axle[i]] * s->wheel_share[i] : 0;
+    }
+    c->work = 1;
+    if (!driven) return;
+    for (int32_t i = 0; i < n; i++) {
+        c->at_rest[i] /= whole;
+        c->watched_share[i] = c->watched[i] ? c->at_rest[i] : 0;
+        work += c->watched_share[i];
+    }
+    for (int32_t i = 0; i < n && work > 0; i++) c->watched_share[i] /= work;
+    if (work > 0) c->work = work;
+    const int32_t count = find_trends(s, c);
     c->warps = driven - count;
     c->slopes = count > 1 && !(unpowered && c->warps) ? count - 1 : 0; /* see hidden.c */
-    c->share = driven ? 1 / (tg_real)driven : 0;
+    c->share = 1 / (tg_real)driven;
 }
 
 /* Of adhesions or slips what no trend holds. All TG_MAX_WHEELS values are read and written, so that loops are of one length: those of
@@ -69,6 +84,38 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
     }
     lanes_store(warp, first);
     lanes_store(warp + TG_LANES, last);
+}
+
+/* How far the adhesions of one side oppose those of the other, as where a machine turns by its wheels' speeds: 0 where both push the same way,
+ * 1 in a turn on the spot. */
+static tg_real opposed(const tg_estimator *e)
+{
+    tg_real left = 0, right = 0;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) *(e->constants.side[i] < 0 ? &left : &right) += e->constants.at_rest[i] * e->belief.x[i];
+    if (left * right >= 0) return 0;
+    const tg_real ratio = -left / right;
+    return ratio < 1 ? ratio : 1 / ratio;
+}
+
+/* Of the adhesions what no trend holds. A load shifts an adhesion by a share of itself, so where the sides oppose each other a diagonal's load
+ * shows as front against rear, and what front and rear do differently as one diagonal against the other: trends are those of the adhesions
+ * in each side's own direction. Wheels near the middle of a turn shear less sideways than those at the ends, and push more. */
+static void warp_of_adhesions(const tg_estimator *e, tg_real *warp)
+{
+    const tgi_constants *c = &e->constants;
+    const tg_real share = opposed(e);
+    tgi_warp(c, e->belief.x, warp);
+    if (!(share > 0)) return;
+    tg_real value[TG_MAX_WHEELS], mirrored[TG_MAX_WHEELS], middle = 0;
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        value[i] = c->side[i] < 0 ? -e->belief.x[i] : e->belief.x[i];
+        middle += c->at_rest[i] * c->middle[i] * value[i];
+    }
+    tgi_warp(c, value, mirrored);
+    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+        const tg_real left = mirrored[i] - middle * c->middle[i];
+        warp[i] += share * ((c->side[i] < 0 ? -left : left) - warp[i]);
+    }
 }
 
 /* Slips of the driven wheels after a row's estimate. */
@@ -174,7 +221,7 @@ static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travell
 void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
 {
     tgi_warped *w = &e->warped;
-    tgi_warp(&e->constants, e->belief.x, w->now);
+    warp_of_adhesions(e, w->now);
     for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
     if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, slips, travelled, gain);
     else memset(w->slip, 0, sizeof w->slip);
