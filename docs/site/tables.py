@@ -38,6 +38,7 @@ KEYS: dict[type[BaseModel], dict[str, str]] = {
         "over_minimum": "no value where the divisor is smaller in size than this",
         "derivative_of": "one to three columns whose derivative is the channel; latitude and longitude with `unit: deg`",
         "norm_of": "two or three columns of a vector, whose size is the channel",
+        "sum_of": "columns that are added, as two pins of a hitch; or each with a factor, `{a: 14.3, b: -14.3}`",
         "pitch_of": "the columns x, y, z, w of a quaternion",
         "roll_of": "the columns x, y, z, w of a quaternion",
         "constant": "one value for the whole log",

@@ -108,6 +108,27 @@ def test_nanosecond_stamps_keep_their_digits(foreign: pd.DataFrame) -> None:
     np.testing.assert_allclose(Profile.from_dict(data).apply(foreign).time, np.arange(200) * 1e-3, atol=1e-12)
 
 
+def test_two_pins_are_added_and_two_pressures_subtracted(tmp_path: Path) -> None:
+    """The sum had to be made outside: a hitch load of two pins, a torque of a hydraulic motor's two ports."""
+    rows = "0,1,2,4000,30,20,2,1\n.1,1.5,2.5,4000,35,20,2,1\n.2,,2,4000,20,25,2,1\n"
+    (tmp_path / "log.csv").write_text(
+        "time,l [kN],r [kN],f [N],a [bar],b [bar],ground_speed,wheel_speed_x\n" + rows
+    )
+    channels = {"ground_speed": "ground_speed", "wheel_speed_x": "wheel_speed_x"}
+    pins = {
+        "hitch_load": {"sum_of": ["l", "r"]},
+        "drawbar_force": {"sum_of": {"l": 1000, "f": 1}, "unit": "N"},
+    }
+    torque = {"drive_torque_x": {"sum_of": {"a": 14.0, "b": -14.0}, "unit": "N m"}}
+    recording = read(tmp_path / "log.csv", Profile.from_dict({"channels": channels | pins | torque}))
+    np.testing.assert_allclose(recording["hitch_load"], [3000, 4000, np.nan])
+    np.testing.assert_allclose(recording["drawbar_force"], [5000, 5500, np.nan])
+    np.testing.assert_allclose(recording["drive_torque_x"], [140, 210, -70])
+    unlike = {"hitch_load": {"sum_of": ["l", "f"]}}
+    with pytest.raises(InputError, match="columns l, f: are of unlike units"):
+        read(tmp_path / "log.csv", Profile.from_dict({"channels": channels | unlike}))
+
+
 def test_rows_are_selected(foreign: pd.DataFrame) -> None:
     data = {
         "time": {"from": "stamp", "unit": "ms"},

@@ -413,6 +413,17 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
     assert "twist.twist.linear.x" in text
 
 
+@pytest.mark.parametrize(
+    ("name", "channel"), [("Zugkraft {} [kN]", "drawbar_force"), ("hitch vertical {} [kN]", "hitch_load")]
+)
+def test_the_two_pins_of_a_hitch_are_added(name: str, channel: str) -> None:
+    """The left one was the whole, surely."""
+    columns = {name.format(side): 2 + SPEED for side in ("links", "rechts")}
+    proposal = _propose(columns)[channel]
+    assert proposal.entry == {"sum_of": list(columns), "unit": "kN"}
+    assert not proposal.doubt
+
+
 def test_a_profile_of_four_wheels_does_not_fit_a_rover_of_six(tmp_path: Path) -> None:
     """'A profile fits: --profile ros2-4wd' led to a refusal for want of wheel_speed_ml; the joints named drive were no wheels."""
     columns = {"/vio/odometry.twist.twist.linear.x": SPEED}

@@ -31,6 +31,7 @@ PROFILE = {
         "pitch": {"pitch_of": ["qx", "qy", "qz", "qw"]},
         "roll": {"roll_of": ["qx", "qy", "qz", "qw"]},
         "drawbar_force": {"from": "nowhere", "else": {"norm_of": ["px", "py"], "unit": "kN"}},
+        "hitch_load": {"sum_of": {"px": 2.0, "py": -0.5}, "unit": "kN", "invalid": [[60, 100]]},
         "altitude": {"from": "gone", "optional": True},
         "acceleration_z": {"constant": 9.81},
     },

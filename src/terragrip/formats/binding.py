@@ -87,7 +87,7 @@ def _bound(origin: Source, log: LogTable) -> Source | None:
         if held is None and origin.otherwise is not None:
             return None
         update["column"] = held or result[0]
-    for key in ("derivative_of", "norm_of", "pitch_of", "roll_of"):
+    for key in ("derivative_of", "norm_of", "sum_of", "pitch_of", "roll_of"):
         names = getattr(origin, key)
         if names is not None:
             columns = [next(iter(matching(name, log.columns)), None) for name in names]
@@ -96,6 +96,8 @@ def _bound(origin: Source, log: LogTable) -> Source | None:
             ):
                 return None
             update[key] = tuple(columns)
+            if key == "sum_of":
+                update[key] = dict(zip(columns, names.values(), strict=True))
     bound_one = origin.model_copy(update=update)
     return bound_one if all(column in log.columns for column in bound_one.columns) else None
 

@@ -224,6 +224,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         raw, deviation = _rate(origin, log, time)
     elif origin.norm_of is not None:
         raw = np.sqrt(sum(part**2 for part in _raw(origin.norm_of, log, time)))
+    elif origin.sum_of is not None:
+        raw = _sum(origin, log, time)
     elif origin.pitch_of is not None:
         raw = pitch_of(_raw(origin.pitch_of, log, time))
     elif origin.roll_of is not None:
@@ -265,7 +267,13 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
-    stated = log.units.get(str(origin.column)) if origin.scale == 1.0 and origin.over is None else None
+    plain = origin.scale == 1.0 and origin.over is None and set((origin.sum_of or {}).values()) <= {1.0}
+    every = {log.units.get(column) for column in origin.sum_of or (str(origin.column),)}
+    if len(every) > 1 and plain:
+        hint = "give each its factor, and the sum a unit: 'sum_of: {a: 1, b: 1000}, unit: N'"
+        place = f"columns {', '.join(origin.columns)}"
+        raise InputError("are of unlike units", file=log.source, place=place, hint=hint)
+    stated = every.pop() if plain else None
     if stated is None:
         return 1.0
     try:
@@ -273,7 +281,7 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
     except UnitError as error:
         hint = f"give {name} a unit or a scale in the profile"
         raise InputError(
-            error.problem, file=log.source, place=f"column {origin.column}", hint=hint
+            error.problem, file=log.source, place=f"column {', '.join(origin.columns)}", hint=hint
         ) from error
 
 
@@ -287,6 +295,16 @@ def _between(time: Floats, values: Floats) -> Floats:
 
 def _raw(columns: tuple[str, ...], log: LogTable, time: Floats) -> list[Floats]:
     return [numbers(column, log.columns[column], time, log.source) for column in columns]
+
+
+def _sum(origin: Source, log: LogTable, time: Floats) -> Floats:
+    """The sum (n,) of columns times their factors at the instants of the first; others of their own clock are taken between samples."""
+    (first, *others), factors = (
+        [_without_invalid(part, origin) for part in _raw(tuple(origin.sum_of or ()), log, time)],
+        (origin.sum_of or {}).values(),
+    )
+    parts = [first, *(_between(time, part) if log.clocked else part for part in others)]
+    return np.asarray(sum(factor * part for factor, part in zip(factors, parts, strict=True)))
 
 
 def _without_invalid(values: Floats, origin: Source) -> Floats:

@@ -15,7 +15,8 @@ With ``over`` the raw value is a quotient of two columns, as a torque is power o
 smaller in size than ``over_minimum``, and between the updates of a held dividend.
 
 ``from`` may list names; the first one in the log with a value counts. ``*`` in a name is any text.
-``norm_of`` is the size of a vector of two or three columns. ``derivative_of`` accepts a latitude and a longitude too, with
+``norm_of`` is the size of a vector of two or three columns, ``sum_of`` a sum of columns, each times its factor if factors are given
+(``{sum_of: {p_a: 14.3, p_b: -14.3}}``). ``derivative_of`` accepts a latitude and a longitude too, with
 ``unit: deg``. ``else`` is the source to use where the log lacks the first: ``{from: gps_speed, else: {derivative_of: [x, y]}}``.
 A channel with ``optional: true`` is left out, with a note, where the log lacks it. ``dbc:`` names the DBC files of a CAN
 log, from the profile's folder. Profiles that come with Terragrip are used by name: `SHIPPED`.

@@ -20,6 +20,11 @@ def _one_or_several(value: object) -> object:
     return (value,) if isinstance(value, str) else value
 
 
+def _with_factors(value: object) -> object:
+    """``sum_of: [left, right]`` is short for ``sum_of: {left: 1, right: 1}``."""
+    return dict.fromkeys(value, 1.0) if isinstance(value, list | tuple) else value
+
+
 Quaternion = tuple[str, str, str, str]
 
 
@@ -49,6 +54,14 @@ class Source(Part):
         Annotated[tuple[str, ...], BeforeValidator(_one_or_several), Field(min_length=1, max_length=3)] | None
     ) = None
     norm_of: Annotated[tuple[str, ...], Field(min_length=2, max_length=3)] | None = None
+    sum_of: (
+        Annotated[
+            dict[str, Annotated[float, Field(allow_inf_nan=False)]],
+            BeforeValidator(_with_factors),
+            Field(min_length=2),
+        ]
+        | None
+    ) = None
     pitch_of: Quaternion | None = None
     roll_of: Quaternion | None = None
     constant: str | float | None = None
@@ -66,11 +79,11 @@ class Source(Part):
     def _one_source(self) -> Self:
         given = [
             k
-            for k in ("column", "derivative_of", "norm_of", "pitch_of", "roll_of", "constant")
+            for k in ("column", "derivative_of", "norm_of", "sum_of", "pitch_of", "roll_of", "constant")
             if getattr(self, k) is not None
         ]
         if len(given) != 1:
-            hint = "write one of from, derivative_of, norm_of, pitch_of, roll_of, constant"
+            hint = "write one of from, derivative_of, norm_of, sum_of, pitch_of, roll_of, constant"
             raise Fault("needs exactly one source", hint)
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
@@ -130,6 +143,7 @@ class Source(Part):
             self.over,
             *(self.derivative_of or ()),
             *(self.norm_of or ()),
+            *(self.sum_of or ()),
             *(self.pitch_of or ()),
             *(self.roll_of or ()),
             *heading,

@@ -67,7 +67,7 @@ class Proposal:
     @property
     def columns(self) -> tuple[str, ...]:
         """The log's columns that it would read."""
-        keys = ("from", "derivative_of", "norm_of", "pitch_of")
+        keys = ("from", "derivative_of", "norm_of", "sum_of", "pitch_of")
         result = next((self.entry[k] for k in keys if k in self.entry), None)
         return (result,) if isinstance(result, str) else tuple(result) if isinstance(result, list) else ()
 
@@ -227,6 +227,10 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
             give = f"at the wheel (scale 1), or motor side, which needs the gear ratio: the scale is {turns}"
     if target is not None and guess.sign < 0:
         entry["sign"] = -1
+    twin = next((g for g in others if _is_of_the_other_side(guess.column, g.column)), None)
+    if channel in ("drawbar_force", "hitch_load") and twin is not None and "scale" not in entry:
+        entry = {"sum_of": [entry.pop("from"), twin.column.column]} | entry
+        shown = (*shown, "the sum of both sides")
     return Proposal(
         entry,
         doubt,
@@ -236,6 +240,13 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         tuple(_proposal(channel, g, [], vehicle) for g in others[:3]),
         unit or None,
     )
+
+
+def _is_of_the_other_side(column: Column, other: Column) -> bool:
+    """Whether two columns differ by left and right alone, as the pins of a hitch do."""
+    sides = {"left", "right"}
+    here, there = column.name.concepts, other.name.concepts
+    return here ^ there == sides and len(here & sides) == 1 and column.unit == other.unit
 
 
 def _add_derived(

@@ -120,7 +120,7 @@ class Decoder:
         if source.constant is not None:
             constant = quantity(source.constant, unit_of(name) or "1")
             return _Step(name, source.delay, (place, 0), lambda fields: constant)
-        several = source.norm_of or source.pitch_of or source.roll_of
+        several = source.norm_of or source.sum_of or source.pitch_of or source.roll_of
         if several is not None:
             columns = [next(iter(matching(column, layout)), None) for column in several]
             if None in columns:
@@ -209,7 +209,7 @@ class Decoder:
         return read
 
     def _vector(self, name: str, source: Source, columns: list[str]) -> Read:
-        """The size of a vector, or the pitch or roll of a quaternion."""
+        """The size of a vector, a sum, or the pitch or roll of a quaternion."""
         import numpy as np
 
         from terragrip.formats.derivation import pitch_of, roll_of
@@ -225,6 +225,13 @@ class Decoder:
                 value = math.sqrt(
                     sum(number * number for number in numbers)
                 )  # hypot rounds otherwise than a file's columns
+            elif source.sum_of is not None:
+                bad = [item if isinstance(item, tuple) else (item, item) for item in source.invalid]
+                if any(low <= number <= high for number in numbers for low, high in bad):
+                    return None
+                value = sum(
+                    factor * number for factor, number in zip(source.sum_of.values(), numbers, strict=True)
+                )
             else:
                 angle = pitch_of if source.pitch_of is not None else roll_of
                 value = float(angle([np.array([number]) for number in numbers])[0])
