@@ -19,7 +19,7 @@ from terragrip.report.page import Picture, Section, Table
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.known import known_soils
-from terragrip.soil.learn import Campaign
+from terragrip.soil.learn import Campaign, LearnedSoil
 from terragrip.soil.library import Soil, SoilLibrary
 
 
@@ -60,6 +60,22 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
         "6",
     )
     assert float(row["R²: ours, by pull"]) > 0.97
+
+
+def test_a_fit_that_is_a_hint_only_does_not_look_the_surest(curves: list[SoilCurves]) -> None:
+    """Elsewhere than in the paper, and without an interval: no columns of dashes, a dotted line, and it is said at each number."""
+    hints = [replace(one, name=f"soil{i}", paper=None, learned=_guessed(one)) for i, one in enumerate(curves)]
+    section = soil_sections.fits(hints, {})
+    assert not any("paper" in head for table in tables(section) for head in table.header)
+    assert "Dotted: a hint only" in section.content[0].caption
+    assert "a hint only" in draw_fits(hints)
+    assert "a hint only" not in draw_fits(curves)
+    (peaks,) = tables(soil_sections.both_maxima(hints, 0.02))
+    assert all(cell.endswith("a hint") for row in peaks.rows for cell in row[1:3])
+
+
+def _guessed(one: SoilCurves) -> LearnedSoil:
+    return replace(one.learned, curve=AdhesionCurve(bootstrap=0).fit_bins(one.learned.curve.bins_))
 
 
 def test_hard_stands_first_and_alone_as_in_the_paper(curves: list[SoilCurves]) -> None:

@@ -83,6 +83,18 @@ def test_work_headland_road_and_standing_are_told_by_the_track_alone(tractor: Pa
         assert np.mean(found[truth == what] == what) > 0.8, what
 
 
+def test_a_mean_counts_what_is_known_of_each_piece() -> None:
+    """A minute at 8 %, then four stuck, a second of each half minute between two spells: the mean was that of the spells' edges."""
+    time = np.arange(300.0)
+    known = (time < 60) | (time % 30 == 0)
+    slip = np.where(time < 60, 0.08, 0.9)
+    table = pd.DataFrame(
+        {"time": time, "slip_drive": slip, "slip_drive_std": np.where(known, 0.01, 1.0), "soil": "field"}
+    )
+    (field,) = shares([blocks_of(Run("stuck", table, "slip-only"))])
+    assert field.slip[0] == pytest.approx(slip[known].mean())
+
+
 def test_the_hour_of_a_tractor_is_parted_as_its_dataset_labels_it() -> None:
     """Against the dataset's own STATE, which no setting was tuned to."""
     log = Path(__file__).parents[3] / "shared" / "data" / "tractor_t7" / "session2_hour.csv.gz"
@@ -193,7 +205,7 @@ def test_every_wheel_is_drawn_and_told(tmp_path: Path) -> None:
     assert [row[0] for row in table.rows] == list(made_up.WHEELS)
     run = run_of(tmp_path / "a.parquet")
     for row in table.rows:
-        mean = float(row[1].split(" %")[0])
+        mean = float(row[1].split(" ±")[0])
         assert mean == pytest.approx(100 * run.estimated(f"slip_{row[0]}").mean(), abs=0.06)
 
 

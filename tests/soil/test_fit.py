@@ -77,9 +77,9 @@ def test_one_run_gives_no_interval_and_says_so():
     slip, mu, _ = pairs(4, a=0.85)
     curve = AdhesionCurve().fit(slip, mu)
     assert curve.interval_ == {}
-    assert curve.notes_[0].startswith("All samples come from 1 run: no interval")
+    assert curve.notes_[0].startswith("All samples come from 1 run or stretch of a run: no interval")
     two = AdhesionCurve().fit(slip, mu, np.arange(slip.size) % 2)
-    assert two.notes_[0].startswith("All samples come from 2 runs: no interval")
+    assert two.notes_[0].startswith("All samples come from 2 runs or stretches of a run: no interval")
     with pytest.raises(ValueError, match="without a bootstrap"):
         curve.band([0.1])
 

@@ -269,7 +269,7 @@ def _picture(advice: Mapping[str, Advice], drawn: Sequence[str]) -> Picture:
         for plot in plots[-1]:
             plot.set_xlabel("slip [%]")
         for plot in plots[:, 0]:
-            plot.set_ylabel("efficiency [-]")
+            plot.set_ylabel("efficiency [–]")
         handles, labels = plots.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=5)
     shown = (

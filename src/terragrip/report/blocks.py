@@ -117,13 +117,15 @@ def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> 
         max((getattr(one, name) for one, rows in chosen if rows.any()), default=0.0)
         for name in ("slip_sd", "adhesion_sd")
     ]
-    slip, half = _mean(joined("slip"), seconds)
-    adhesion, wide = _mean(joined("adhesion"), seconds)
-    resistance, _ = _mean(joined("resistance"), seconds)
+    bands = joined("bands")
+    known = bands.sum(axis=1)  # a piece of which one second is known has the weight of one second
+    slip, half = _mean(joined("slip"), known)
+    adhesion, wide = _mean(joined("adhesion"), known)
+    resistance, _ = _mean(joined("resistance"), known)
     return Share(
         label, float(seconds.sum()), float(joined("metres").sum()),
         (slip, float(np.hypot(half, 1.96 * common[0]))), (adhesion, float(np.hypot(wide, 1.96 * common[1] * abs(adhesion)))),
-        resistance, joined("bands").sum(axis=0),
+        resistance, bands.sum(axis=0),
     )  # fmt: skip
 
 

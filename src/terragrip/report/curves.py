@@ -52,6 +52,11 @@ class SoilCurves:
     true_by_slip: AdhesionCurve | None = None
 
     @property
+    def sure(self) -> bool:
+        """Whether the data fix the curve and give it an interval; else it is a hint only, drawn dotted."""
+        return self.learned.curve.identifiability_.identifiable and self.learned.curve.has_band
+
+    @property
     def by_slip(self) -> AdhesionCurve | None:
         """The paper's fit where it stands beside another; None where it is the one that counts."""
         return None if self.learned.by_slip is self.learned.curve else self.learned.by_slip
@@ -106,7 +111,7 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
     figure = new_figure(8.4, 4.2)
     with styled():
         plot = figure.subplots()
-        sources: list[tuple[str, Soil, dict[str, Any]]] = [("", curve.learned.soil, {"linewidth": 1.8})]
+        sources: list[tuple[str, Soil, dict[str, Any]]] = [("", curve.learned.soil, _line(curve))]
         if curve.truth is not None:
             sources.append((" of the truth", curve.truth, {"linewidth": 0.9, "linestyle": "--"}))
         slip = np.linspace(0.0, 1.0, 401)
@@ -146,8 +151,8 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
         for curve in curves:
             soil, color = curve.learned.soil, soil_color(curve.name, names)
             peaks = maxima(soil, tire_resistance)
-            left.plot(slip, soil.value(slip), color=color, label=curve.name, linewidth=1.7)
-            right.plot(slip, _efficiency(soil, slip, tire_resistance), color=color, linewidth=1.7)
+            left.plot(slip, soil.value(slip), color=color, label=curve.name, **_line(curve))
+            right.plot(slip, _efficiency(soil, slip, tire_resistance), color=color, **_line(curve))
             left.plot([peaks.adhesion[0]], [peaks.adhesion[1]], "o", color=color, markersize=5)
             right.plot([peaks.efficiency[0]], [peaks.efficiency[1]], "s", color=color, markersize=5)
         for plot, label in ((left, "adhesion µ [–]"), (right, "tractive efficiency η [–]")):
@@ -174,9 +179,9 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
         named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
     lines: list[tuple[str, Floats | None, dict[str, Any]]] = [
         (
-            "fit to the bins" + (" by pull" if by_pull else ""),
+            "fit to the bins" + (" by pull" if by_pull else "") + ("" if shown.sure else ", a hint only"),
             counts.predict(SLIPS),
-            {"color": BLUE, "linewidth": 1.8},
+            {"color": BLUE, **_line(shown)},
         ),
         (
             "fit by slip, the paper's way",
@@ -192,6 +197,11 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
     plot.set_xlim(0, SLIPS[-1])
     plot.set_ylim(bottom=0)
     return named
+
+
+def _line(curve: SoilCurves) -> dict[str, Any]:
+    """How a fit is drawn: one that is a hint only must not look the surest, for want of a band."""
+    return {"linewidth": 1.8, "linestyle": "-" if curve.sure else ":"}
 
 
 def _draw_bins(plot: Axes, curve: AdhesionCurve, marker: str, color: str, size: float) -> Any:

@@ -123,8 +123,7 @@ def report_of(
     comparisons: list[Comparison] = [c for run in together for c in compare(run)]
     page = Page(
         title,
-        f"{len(paths)} run{'s' * (len(paths) != 1)}, {sum(one.duration for one in summaries) / 60:.0f} minutes, "
-        f"{sum(one.distance for one in summaries):.0f} m, estimated by {names(sorted({one.method for one in summaries}))}. "
+        f"{summary.extent([one.driven for one in summaries])}, estimated by {names(sorted({one.method for one in summaries}))}. "
         f"Drawn over time: {names([run.name for run in together])}.",
         (
             _summarised(read, main, grounds, campaign),

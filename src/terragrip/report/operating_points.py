@@ -15,6 +15,7 @@ from terragrip.arrays import Bools, Floats
 from terragrip.report.page import Table, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.style import INK, new_figure, soil_color, styled, to_svg
+from terragrip.soil.literature import paper_soils
 
 LEAST_ROWS = 100
 """A section or a soil with fewer rows has no mean worth a cross."""
@@ -121,7 +122,8 @@ def cross_table(crosses: Iterable[Cross], what: str) -> Table:
     return Table(
         f"Mean ± SD of {what} and mean slip by soil."
         + (" The sensor's column is its F_x/F_z, which follows κ." if "measured" in sources else "")
-        + " The paper finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse.",
+        + " The paper finds its estimate of µ within .015 of its sensor on grass, wet and fine, and within .03 on coarse."
+        * bool({"measured"} & {*sources} and by_soil.keys() & paper_soils().keys()),
         (
             "soil",
             *(named[v] for v in sources),

@@ -46,13 +46,22 @@ def over_time(run: Run) -> Section:
 def zero_sentence(run: Run) -> tuple[str, ...]:
     """Where slip counts from, and what the log's own lightest stretches say beside it."""
     zero_slip = run.estimates.attrs.get("zero_slip") or {}
-    ratios = "; ".join(f"{wheel}: {one['ratio']:.4f} ± {one['std']:.4f}" for wheel, one in zero_slip.items())
+    vehicle = run.vehicle
+    speed = (
+        "rim speed by the vehicle file's radius"
+        if vehicle and vehicle.knows_wheels
+        else "speed that the machine reports"
+    )
+    ratios = [
+        f"{one['ratio']:.3f} (SD {one['std']:.3f}) of the {speed}{f' ({wheel})' * (wheel != DRIVE)}"
+        + (f"; {one['doubt']}" if one.get("doubt") else "")
+        for wheel, one in zero_slip.items()
+    ]
     beside = (
-        f" In the lightest tenth of the log's steady stretches ground speed over rim speed, by the vehicle file's radius, is {ratios}."
+        f" Zero slip by the lightest stretches of this log: ground speed {'; '.join(ratios)}."
         if ratios
         else ""
     )
-    vehicle = run.vehicle
     if vehicle is not None and calibrated_scale(vehicle) is not None:
         return (f"Slip counts from the calibrated {'radius' if vehicle.knows_wheels else 'speed'}.{beside}",)
     if DRIVE in zero_slip:

@@ -17,6 +17,7 @@ from terragrip.soil.literature import paper_soils
 NOTHING: Mapping[str, str] = MappingProxyType({})
 FIRST = "hard"
 """The soil that the paper shows alone; else the one with the most bins stands there."""
+HINT = " Dotted: a hint only, the data do not fix the curve or give it no interval."
 NO_SOILS = "Left out: no sample of these estimates carries a soil label, so there is no curve to fit."
 NONE_FITTED = "Left out: no soil could be fitted."
 
@@ -40,7 +41,7 @@ def curves_of_all(
         )
         for name, learned in campaign.soils.items()
     ]
-    return sorted(result, key=lambda one: (one.name != FIRST, -len(one.learned.soil.bins)))
+    return sorted(result, key=lambda one: (one.name != FIRST, not one.sure, -len(one.learned.soil.bins)))
 
 
 def both_maxima(
@@ -57,7 +58,7 @@ def both_maxima(
             f"maxima-{_stem(first.name)}",
             draw_both_maxima(first, tire_resistance),
             f"Adhesion µ(s) and tractive efficiency η(s) on {first.name} by the fitted curve{truth}. Most pull and best efficiency "
-            "lie at different slips: the curve shows the cost of each.",
+            "lie at different slips: the curve shows the cost of each." + HINT * (not first.sure),
             f"Adhesion and efficiency over slip on {first.name}, both maxima marked",
         )
     ]
@@ -66,7 +67,8 @@ def both_maxima(
             Picture(
                 "maxima",
                 draw_all_maxima(curves, tire_resistance),
-                "µ(s) (left) and η(s) (right) of every soil by its fitted curve; dots and squares mark the maxima.",
+                "µ(s) (left) and η(s) (right) of every soil by its fitted curve; dots and squares mark the maxima."
+                + HINT * (not all(one.sure for one in curves)),
                 "Adhesion and efficiency over slip of every soil",
             )
         )
@@ -98,7 +100,7 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
     ]
     if len(alike) == len(curves):
         text += "; the simulated soils were made with the paper's a, so that both lie on one line"
-    how = _preparation(curves)
+    how = _preparation(curves) + HINT * (not all(one.sure for one in curves))
     content: list[Picture | Table] = [
         Picture(
             f"fit-{_stem(first.name)}",
@@ -152,24 +154,27 @@ def _range(bins: BinSettings) -> str:
 
 def _quality_table(curves: Sequence[SoilCurves]) -> Table:
     """NRMSE and R² of the fits: the paper's, ours, ours the paper's way, and the same fit on true pairs."""
-    true, both = _true(curves), _both(curves)
+    true, both, paper = _true(curves), _both(curves), _paper(curves)
     rows = []
     for one in curves:
         row = [one.name]
         for key in ("nrmse", "r2"):
-            row += [number(getattr(one.paper, key, None)), number(getattr(one.learned.soil, key))]
+            row += [number(getattr(one.paper, key, None))] * paper + [number(getattr(one.learned.soil, key))]
             row += [number(getattr(one.by_slip, f"{key}_", None))] * both
             row += [number(getattr(one.true_pairs, f"{key}_", None))] * true
         runs = len({part.run for part in one.learned.pairs})
         rows.append((*row, str(len(one.learned.soil.bins)), str(runs) if runs else "–"))
     ours = ("ours, by pull", "ours, by slip") if both else ("ours",)
     head = [
-        f"{what}: {who}" for what in ("NRMSE", "R²") for who in ("paper", *ours, *(["true pairs"] * true))
+        f"{what}: {who}"
+        for what in ("NRMSE", "R²")
+        for who in (*(["paper"] * paper), *ours, *(["true pairs"] * true))
     ]
     ending = ' "True pairs": the same fit as ours on the simulation\'s own slip and adhesion.' if true else ""
     return Table(
-        "Quality of the fits on bin means, as in the paper's Table 1 (its figures come from the field, its bins are by slip)."
-        + ending,
+        "Quality of the fits on bin means"
+        + ", as in the paper's Table 1 (its figures come from the field, its bins are by slip)" * paper
+        + f".{ending}",
         ("soil", *head, "bins", "runs"),
         tuple(rows),
     )
@@ -177,12 +182,12 @@ def _quality_table(curves: Sequence[SoilCurves]) -> Table:
 
 def _scale_table(curves: Sequence[SoilCurves]) -> Table:
     """The scale a: paper, ours with interval, ours the paper's way, both of true pairs, of the truth."""
-    true, both = _true(curves), _both(curves)
+    true, both, paper = _true(curves), _both(curves), _paper(curves)
     rows = []
     for one in curves:
         row = [
             one.name,
-            _scale(one.paper),
+            *[_scale(one.paper)] * paper,
             _scale(one.learned.soil),
             _interval(one.learned.soil.interval.get("a")),
         ]
@@ -200,7 +205,7 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
         rows.append(tuple(row))
     head = [
         "soil",
-        "paper",
+        *["paper"] * paper,
         *(("ours, by pull", "95 %", "ours, by slip", "95 %") if both else ("ours", "95 %")),
     ]
     if true:
@@ -219,6 +224,11 @@ def _scale_table(curves: Sequence[SoilCurves]) -> Table:
 
 def _true(curves: Sequence[SoilCurves]) -> bool:
     return any(one.true_pairs is not None for one in curves)
+
+
+def _paper(curves: Sequence[SoilCurves]) -> bool:
+    """Whether any soil is one of the paper's: a machine elsewhere has no use for its columns."""
+    return any(one.paper is not None for one in curves)
 
 
 def _both(curves: Sequence[SoilCurves]) -> bool:
@@ -241,7 +251,10 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
                 continue
             peaks = maxima(soil, tire_resistance)
             row += [
-                f"{number(height, 2)} at {percent(at, 0)}" if at == at else "–"
+                f"{number(height, 2)} at {percent(at, 0)}"
+                + ", a hint" * (soil is not one.truth and not one.sure)
+                if at == at
+                else "–"
                 for at, height in (peaks.adhesion, peaks.efficiency)
             ]
         resistance = one.learned.soil.resistance

@@ -117,11 +117,12 @@ def in_page(svg: str, label: str, prefix: str) -> str:
 
 
 def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
-    """The colour of a soil: fixed for the paper's five, for others one of its own by its place in `soils`."""
+    """The colour of a soil: fixed for the paper's five, for others one of its own by its place among `soils` in order of names: each
+    figure has an order of its own."""
     known = SOIL_COLORS | PART_COLORS
     if soil in known:
         return known[soil]
-    others = list(dict.fromkeys(name for name in soils if name not in known))
+    others = sorted({name for name in soils if name not in known})
     if soil not in others:
         return MUTED
     place = others.index(soil)

@@ -69,7 +69,7 @@ def by_label(
     by_part: bool = False,
 ) -> Table:
     """Time, way, slip and adhesion with intervals by label, beside what the label's curve allows."""
-    peaks = {one.name: maxima(one.learned.soil, tire_resistance) for one in curves}
+    peaks = {one.name: (maxima(one.learned.soil, tire_resistance), one.sure) for one in curves}
     adhesion = any(np.isfinite(one.adhesion[0]) for one in result)
     rows = []
     for one in result:
@@ -83,7 +83,7 @@ def by_label(
         if adhesion:
             row += [_with_half(one.adhesion), number(one.resistance)]
         if peaks:
-            row += _peak(peaks.get(one.label))
+            row += _peak(*peaks.get(one.label, (None, False)))
         rows.append(tuple(row))
     head = ["what" if by_part else "label", "time [min]", "way [m]", "speed [m/s]", "slip, 95 % interval"]
     head += ["µ, 95 % interval", "mean ρs"] * adhesion
@@ -115,11 +115,14 @@ def clock(runs: Sequence[Driven]) -> str:
 
 def _driven(runs: Sequence[Driven], simulated: bool) -> str:
     when = clock(runs)
+    return f"Driven{' (simulated)' if simulated else ''}: {extent(runs)}{', ' + when if when else ''}."
+
+
+def extent(runs: Sequence[Driven]) -> str:
+    """How many runs, how long and how far, in words."""
     minutes, metres = sum(one.duration for one in runs) / 60, sum(one.distance for one in runs)
-    return (
-        f"Driven{' (simulated)' if simulated else ''}: {len(runs)} run{'s' * (len(runs) != 1)}, "
-        f"{number(minutes, 0 if minutes >= 10 else 1)} minutes, {number(metres, 0)} m{', ' + when if when else ''}."
-    )
+    time = f"{number(minutes, 0 if minutes >= 10 else 1)} minutes"
+    return f"{len(runs)} run{'s' * (len(runs) != 1)}, {time}, {number(metres, 0)} m"
 
 
 def _slips(result: Sequence[Share], by_part: bool) -> list[str]:
@@ -144,7 +147,7 @@ def _allowed(curves: Sequence[SoilCurves], result: Sequence[Share], tire_resista
             continue
         beside = driven.get(one.name, np.nan)
         end = f" (driven at {percent(beside, 0)})" if np.isfinite(beside) else ""
-        sure = "" if one.learned.curve.identifiability_.identifiable else ", a hint only"
+        sure = "" if one.sure else ", a hint only"
         said.append(f"{one.name} {percent(at, 0)} with η {number(height, 2)}{end}{sure}")
     return [f"Best tractive efficiency by each curve at a slip of: {'; '.join(said)}."] if said else []
 
@@ -169,10 +172,10 @@ def _with_half(pair: tuple[float, float]) -> str:
     return number(mean) if not np.isfinite(half) else f"{number(mean)} ± {number(half)}"
 
 
-def _peak(peaks: Maxima | None) -> list[str]:
+def _peak(peaks: Maxima | None, sure: bool) -> list[str]:
     if peaks is None:
         return ["–", "–"]
     return [
-        f"{number(h, 2)} at {percent(at, 0)}" if at == at else "–"
+        f"{number(h, 2)} at {percent(at, 0)}{'' if sure else ', a hint'}" if at == at else "–"
         for at, h in (peaks.efficiency, peaks.adhesion)
     ]

@@ -142,8 +142,8 @@ def _draw_lane(plot: Axes, time: Floats, lane: Lane, rows: Bools) -> None:
         )
     if lane.std is not None:
         half = 1.96 * lane.std[rows]
-        at, low = _thin(time, lane.estimate[rows] - half)
-        _, high = _thin(time, lane.estimate[rows] + half)
+        at, low = _with_gaps(*_thin(time, lane.estimate[rows] - half))
+        _, high = _with_gaps(*_thin(time, lane.estimate[rows] + half))
         plot.fill_between(
             at, low, high, color=ESTIMATED, alpha=0.22, linewidth=0, label="95 % interval of the estimate"
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.window_means import window_means
-from terragrip.report.page import Picture, Section, Table, number, percent
+from terragrip.report.page import Picture, Section, Table, number
 from terragrip.report.runs import Run
 from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled, to_svg
 
@@ -66,7 +66,7 @@ def _table(run: Run) -> Table:
     rows = []
     for wheel in run.wheels:
         slip = _known(run, "slip", wheel)
-        row = [wheel, f"{percent(_mean(slip))} ± {number(100 * _std(slip), 1)}"]
+        row = [wheel, f"{number(100 * _mean(slip), 1)} ± {number(100 * _std(slip), 1)} %"]
         for name in ("adhesion", "net_traction"):
             if f"{name}_{wheel}" in run.estimates:
                 values = _known(run, name, wheel)

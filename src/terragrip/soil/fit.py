@@ -275,8 +275,9 @@ class AdhesionCurve:
         alive = bins.cluster_count.sum(axis=1) > 0
         clusters = int(np.count_nonzero(alive))
         if clusters < 3:
+            ending = ("", "") if clusters == 1 else ("s", "es")
             self.notes_.append(
-                f"All samples come from {clusters} run{'s' * (clusters != 1)}: no interval can be determined; "
+                f"All samples come from {clusters} run{ending[0]} or stretch{ending[1]} of a run: no interval can be determined; "
                 "give the runs, or drive more of them."
             )
             return
