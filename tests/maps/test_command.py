@@ -36,7 +36,7 @@ def test_the_map_is_written_and_summed_up(
     assert "difference_std" in pyogrio.read_info(out, layer="anomalies")["fields"]
     said = capsys.readouterr().out
     assert "10 % and 90 % quantiles" in said
-    assert "adhesion at 20 % slip" in said
+    assert "adhesion at 10 % slip" in said
     assert "headland" in said
     assert "driven once" in said
 
@@ -89,17 +89,21 @@ def test_reading_a_map_leaves_nothing_beside_it(estimates: Path, tmp_path: Path)
     assert sorted(tmp_path.iterdir()) == [estimates, out]
 
 
-def test_cells_are_as_wide_as_a_tractor_works() -> None:
-    light = {
-        "name": "rover",
-        "mass": 60.0,
-        "axles": {"drive": {"mass": 60.0, "wheels": ["l", "r"]}},
-        "wheel": {"radius": 0.2, "inertia": 0.1},
-    }
-    heavy = light | {"mass": 3000.0, "axles": {"drive": {"mass": 3000.0, "wheels": ["l", "r"]}}}
-    tool = {"working_width": 6.0}
-    cells = [usual_cell(Vehicle.from_dict(one)) for one in (light, light | tool, heavy, heavy | tool)]
-    assert cells == [1.0, 1.0, 3.0, 6.0]
+def test_cells_are_as_large_as_the_machine_or_as_wide_as_it_works() -> None:
+    def cell(mass: float, **more: float) -> float:
+        axles = {"drive": {"mass": mass, "wheels": ["l", "r"]}}
+        tree = {"name": "m", "mass": mass, "axles": axles, "wheel": {"radius": 0.2, "inertia": 0.1}} | more
+        return usual_cell(Vehicle.from_dict(tree))
+
+    assert [cell(mass) for mass in (5.0, 60.0, 139.0, 1000.0, 6000.0, 12000.0)] == [
+        0.3,
+        0.7,
+        1.0,
+        2.0,
+        3.0,
+        5.0,
+    ]
+    assert [cell(mass, working_width=width) for mass, width in ((60.0, 0.5), (3000.0, 6.0))] == [0.5, 6.0]
 
 
 def test_two_days_of_one_file_name_are_told_apart(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from terragrip.estimation import Estimates
 from terragrip.maps import MapMaker, MapSettings, map_of, write_map
 from terragrip.maps.layers import cell_table, layer
 from terragrip.maps.places import places_of
+from terragrip.physics.adhesion import CURVES
 
 if TYPE_CHECKING:
     import geopandas
@@ -25,8 +26,33 @@ if TYPE_CHECKING:
 
 @pytest.mark.parametrize("slip", [0.05, 0.1, 0.3])
 def test_adhesion_is_carried_to_the_reference_slip_whatever_the_slip_was(slip: float) -> None:
-    made = map_of([("a", drive(*lanes(2, 30, 3), slip=slip))])
+    made = map_of([("a", drive(*lanes(2, 30, 3), slip=slip))], MapSettings(reference_slip=0.1))
     np.testing.assert_allclose(made.cells["adhesion"].value, REFERENCE, rtol=2e-3)
+
+
+@pytest.mark.parametrize(("slip", "mapped_at"), [(0.01, 0.02), (0.04, 0.05), (0.12, 0.1), (0.5, 0.2)])
+def test_adhesion_is_mapped_near_the_slip_that_was_driven(slip: float, mapped_at: float) -> None:
+    """From 4 % to 20 % of slip one soil's adhesion grows twofold, another's fourfold."""
+    made = map_of([("a", drive(*lanes(2, 30, 3), slip=slip))])
+    assert made.reference_slip == mapped_at
+
+
+def test_adhesion_far_from_the_slip_driven_says_that_the_curves_form_is_unknown() -> None:
+    firm, curve = drive(*lanes(2, 30, 3), slip=0.04), CURVES["burckhardt"]
+    for wheel in firm.wheels:
+        firm.columns[f"adhesion_{wheel}"] = np.full(len(firm), float(curve.value(0.04, {})))
+    for at, far in ((0.05, 0.0), (0.2, 0.15)):
+        cells = map_of([("a", firm)], MapSettings(reference_slip=at)).cells["adhesion"]
+        assert np.all(np.abs(cells.value - float(curve.value(at, {}))) < 2 * cells.std + 0.01)
+        assert np.all(cells.constant >= far * cells.value)
+
+
+def test_cells_without_adhesion_are_counted_with_the_reason() -> None:
+    idle = drive(*lanes(2, 30, 3), slip=0.01)
+    for wheel in idle.wheels:
+        idle.columns[f"slip_{wheel}_std"] = np.full(len(idle), 0.05)
+    (note,) = [note for note in map_of([("a", idle)]).notes if note.startswith("adhesion")]
+    assert re.match(r"adhesion: 0 of \d+ cells; .* slip was too low or too uncertain .* \(--cell\)", note)
 
 
 def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
@@ -36,8 +62,8 @@ def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
     for wheel in estimates.wheels:
         estimates.columns[f"slip_{wheel}"] = 0.04 + 0.03 * rng.standard_normal(len(estimates))
         estimates.columns[f"slip_{wheel}_std"] = np.full(len(estimates), 0.03)
-    value = map_of([("a", estimates)]).cells["adhesion"].value
-    assert np.median(value) == pytest.approx(REFERENCE, rel=0.15)
+    made = map_of([("a", estimates)], MapSettings(reference_slip=0.1))
+    assert np.median(made.cells["adhesion"].value) == pytest.approx(REFERENCE, rel=0.15)
 
 
 def test_a_cell_lies_where_the_wheels_were_not_the_antenna() -> None:
@@ -114,6 +140,40 @@ def test_patches_are_listed_and_borders_are_not() -> None:
     assert np.all(found.area.between(9, 60))
 
 
+@pytest.mark.parametrize(("rounded", "noise", "cell"), [(0.0, 0.0, 1.0), (0.9, 0.0, 1.5), (0.0, 0.4, 1.5)])
+def test_cells_are_no_smaller_than_the_positions_are_good(rounded: float, noise: float, cell: float) -> None:
+    one, rng = drive(*lanes(6, 40, 3)), np.random.default_rng(1)
+    for name in ("latitude", "longitude"):
+        degree = np.radians(EARTH) * (1.0 if name == "latitude" else np.cos(np.radians(51.0)))
+        moved = one[name] * degree + noise * rng.standard_normal(len(one))
+        one.columns[name] = (np.round(moved / rounded) * rounded if rounded else moved) / degree
+    assert map_of([("a", one)]).cell == cell
+
+
+def test_noise_in_a_field_of_one_soil_is_no_anomaly_beside_a_real_one() -> None:
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        return np.where((np.abs(east - 20) < 2) & (np.abs(north - 10) < 2), 0.5, 1.0)
+
+    for seed in range(1, 4):
+        made = map_of([("a", drive(*lanes(20, 40, 1), a=ground, noise=0.01, seed=seed))])
+        assert [len(found) for found in made.anomalies.values()] == [1, 0]
+
+
+def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
+    rng = np.random.default_rng(5)
+    waves = rng.normal(0, 0.5, (40, 2)), rng.uniform(0, 6.3, 40)
+
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
+        firm = (np.abs(east - 30) < 2) & (np.abs(north - 9) < 2)
+        return np.where(north > 14, 1.3, 1.0) * (1 + 0.01 * own) + 0.35 * firm
+
+    made = map_of([("a", drive(*lanes(20, 60, 1), a=ground, noise=0.01))])
+    assert layer(made, "anomalies").query("quantity == 'adhesion' and kind == 'grips'").pipe(
+        local_east
+    ).round() == [30]
+
+
 def test_change_between_days_is_significant_where_it_is_one() -> None:
     way = lanes(10, 40, 2)
     before = drive(*way, noise=0.01, seed=1)
@@ -124,6 +184,33 @@ def test_change_between_days_is_significant_where_it_is_one() -> None:
     assert changes.significant[east < 18].mean() > 0.9
     assert changes.significant[east > 22].mean() < 0.06
     assert np.median(changes["difference"][east < 18]) == pytest.approx(-0.2 * REFERENCE, rel=0.05)
+
+
+def test_an_uncertain_zero_of_slip_is_no_change_where_another_day_slips_less() -> None:
+    way, days = lanes(6, 40, 2), []
+    for slip in (0.1, 0.05):
+        one = drive(*way, slip=slip, noise=0.01)
+        one.about["vehicle"]["uncertainty"] = {"wheel_radius": 0.01}
+        for wheel in one.wheels:  # the rolling radius is 1 % less than the file says
+            one.columns[f"slip_{wheel}"] = np.full(len(one), slip + 0.01)
+            one.columns[f"slip_{wheel}_std"] = np.full(len(one), 0.011)
+        days.append((f"{slip}", one))
+    assert not map_of(days).changes["adhesion"].significant.any()
+
+
+def test_a_slope_that_nothing_measures_is_the_error_of_a_whole_cell_and_no_change_on_the_way_back() -> None:
+    days = []
+    for name, sign in (("up", 1), ("down", -1)):
+        one = drive(*lanes(6, 40, 2))
+        one.columns["soil_resistance"] = 0.1 + sign * np.full(len(one), 0.015)
+        one.columns["soil_resistance_std"] = np.full(len(one), 0.022)
+        one.about["vehicle"]["uncertainty"] = {"slope": 0.02, "acceleration_bias": 0.03}
+        one.about["settings"] = {"channels": ["ground_speed"]}
+        days.append((name, one))
+    (up, *_), made = days, map_of(days)
+    cells = map_of([up]).cells["soil_resistance"]
+    assert np.all(cells.std > 0.0199)
+    assert not made.changes["soil_resistance"].significant.any()
 
 
 def test_a_single_pass_has_no_changes_and_says_so() -> None:

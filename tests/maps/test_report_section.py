@@ -21,7 +21,7 @@ def test_the_map_is_drawn_and_its_patches_are_listed() -> None:
     section = gathered.section()
     assert section.omitted is None
     picture, table = section.content
-    assert "adhesion at 20 % slip" in picture.svg
+    assert "adhesion at 10 % slip" in picture.svg
     (row,) = table.rows
     assert row[0] == "adhesion"
     assert float(row[1]) == pytest.approx(51.0 + np.degrees(10 / 6378137.0), abs=2e-5)

@@ -42,7 +42,7 @@ def test_the_cells_are_those_that_geopandas_reads(client: TestClient, maps: Path
     frame = geopandas.read_file(maps / "field.gpkg", layer="cells")
     assert (about["cell"], about["epsg"], about["cells"]) == (1.0, 32633, len(frame))
     assert about["runs"] == ["monday", "friday"]
-    assert about["reference_slip"] == 0.2
+    assert about["reference_slip"] == 0.1
     for quantity in ("adhesion", "soil_resistance", "slip", "efficiency"):
         head, sent = unpacked(
             client.get("/api/map/cells", params={"path": "field.gpkg", "quantity": quantity}).content

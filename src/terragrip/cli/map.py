@@ -36,10 +36,13 @@ def command(
         float | None,
         typer.Option(
             metavar="METRES",
-            help="Size of a cell; default 1 m, for machines above a tonne the working width, or 3 m.",
+            help="Size of a cell; default the working width, or by the mass: .2 to 5 m.",
         ),
     ] = None,
-    slip: Annotated[float, typer.Option(metavar="SHARE", help="Slip at which adhesion is mapped.")] = 0.2,
+    slip: Annotated[
+        float | None,
+        typer.Option(metavar="SHARE", help="Slip at which adhesion is mapped; default near the drive's own."),
+    ] = None,
     soils: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="soils.json: the curves that convert adhesion to that slip."),

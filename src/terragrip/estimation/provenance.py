@@ -41,6 +41,7 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
             "held": estimator.held,
             "gap": estimator.thresholds.gap,
             "standstill_speed": estimator.engine.standstill_speed,
+            "channels": sorted(estimator.channels),
         },
     }
     if estimator.slip_reference is not None:

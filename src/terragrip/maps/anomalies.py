@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ REACH = 15.0
 """Cell sizes beyond which nothing is around."""
 SMOOTH = 1.5
 """Cell sizes over which neighbouring residuals are judged together: a patch is larger than a cell."""
+ONE_SD = 0.6827
+"""Share of the scores that lie within one SD, where nothing is an anomaly."""
 FALSE_DISCOVERIES = 0.05
 """Share of what is listed that may be chance (Benjamini and Hochberg 1995)."""
 LEAST_CELLS = 2
@@ -45,8 +48,10 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     """Patches of cells unlike their surroundings, the strongest first.
 
     A cell's residual is its distance beyond the medians of its surroundings on each side. Residuals of neighbours are combined by inverse
-    variance. The null is the scatter (MAD) of these scores about the median of all surrounding cells (Efron 2004: most of a field is no
-    anomaly), so soil that varies as it does everywhere is not an anomaly. At most `share` of the listed patches are due to chance.
+    variance; what constants weigh more in them than around is added to it. The null is the scatter of such scores about the nearest
+    of those medians (their 68 % quantile; Efron 2004: most of a field is no anomaly), so soil that varies as it does everywhere is not an
+    anomaly, and a field of two soils is not one whose soil varies. At most `share` of the cells, and of the listed patches by their
+    smallest p, are due to chance.
     """
     from scipy.spatial import cKDTree
     from scipy.special import ndtr
@@ -55,41 +60,44 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
         return []
     place = np.column_stack([cells.column, cells.row]).astype(float)
     tree = cKDTree(place)
-    around, middle = _around(tree, place, cells.value)
+    around, nearest, middle = _around(tree, place, cells.value, cells.constant)
     variance = np.maximum(cells.std**2 - cells.constant**2, 1e-12)
-    plain, spread = _joined(tree, place, cells.value - middle, variance)
-    beyond, _ = _joined(tree, place, cells.value - around, variance)
+    beyond, spread = _joined(tree, place, cells.value - around, variance)
+    plain, _ = _joined(tree, place, cells.value - nearest, variance)
+    shared, _ = _joined(tree, place, cells.constant - middle, variance)
+    spread = np.hypot(spread, shared)
     known = np.isfinite(plain) & np.isfinite(beyond)
     if known.sum() < AROUND:
         return []
-    null = (plain / spread)[known]
-    scale = 1.4826 * np.median(np.abs(null - np.median(null)))
+    scale = float(np.quantile(np.abs(plain / spread)[known], ONE_SD))
     score = beyond / spread / max(scale, 1.0)
     p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
-    chosen = significant(p, share)
-    return sorted(
-        (
-            _anomaly(patch, cells, place, around, variance, p)
-            for patch in _patches(tree, place, chosen, score)
-        ),
-        key=lambda one: one.p,
-    )
+    patches = [
+        _anomaly(patch, cells, place, around, variance, p)
+        for patch in _patches(tree, place, significant(p, share), score)
+    ]
+    listed = significant(np.array([one.p for one in patches]), share, int(known.sum()))
+    return sorted(compress(patches, listed), key=lambda one: one.p)
 
 
-def significant(p: Floats, share: float) -> Bools:
-    """Which p-values (n,) are significant at a false discovery rate of `share` (Benjamini and Hochberg 1995)."""
+def significant(p: Floats, share: float, tests: int | None = None) -> Bools:
+    """Which p-values (n,) are significant at a false discovery rate of `share` (Benjamini and Hochberg 1995).
+
+    `tests`: of how many these are the smallest, where they are not all.
+    """
     order = np.argsort(p)
-    below = np.flatnonzero(p[order] <= share * np.arange(1, len(p) + 1) / max(len(p), 1))
+    below = np.flatnonzero(p[order] <= share * np.arange(1, len(p) + 1) / max(tests or len(p), 1))
     chosen = np.zeros(len(p), dtype=bool)
     if len(below):
         chosen[order[: below[-1] + 1]] = True
     return chosen
 
 
-def _around(tree: Any, place: Floats, value: Floats) -> tuple[Floats, Floats]:
-    """The expected value of each cell (n,), and the median of its surroundings (n,).
+def _around(tree: Any, place: Floats, value: Floats, constant: Floats) -> tuple[Floats, Floats, Floats]:
+    """The expected value of each cell (n,), the median of that of its four sides which is nearest to its value, and that of the constants
+    around it.
 
-    The first is, of the medians of the surrounding cells on each of four sides, the one nearest to the cell's value. At the border of two
+    The first is the cell's value clipped to the range of the medians of the surrounding cells on the sides. At the border of two
     soils one side agrees with it, so a border is no anomaly; a value between the sides' medians agrees with its surroundings.
     The surroundings are `AROUND` cells, the nearest beyond `CORE` and within `REACH`; a side with less than `SIDE` of them is
     ignored. NaN if fewer than half of them, or no side, are there.
@@ -110,9 +118,11 @@ def _around(tree: Any, place: Floats, value: Floats) -> tuple[Floats, Floats]:
             sides.append(median)
     low, high = np.fmin.reduce(sides), np.fmax.reduce(sides)
     known = (near.sum(axis=1) >= AROUND // 2) & np.isfinite(low)
+    away = np.abs(np.array(sides) - value)
+    nearest = np.array(sides)[np.where(np.isfinite(away), away, np.inf).argmin(axis=0), np.arange(len(value))]
     middle = np.full(len(place), np.nan)
-    middle[known] = np.nanmedian(np.where(near, value[index], np.nan)[known], axis=1)
-    return np.where(known, np.clip(value, low, high), np.nan), middle
+    middle[known] = np.nanmedian(np.where(near, constant[index], np.nan)[known], axis=1)
+    return np.where(known, np.clip(value, low, high), np.nan), np.where(known, nearest, np.nan), middle
 
 
 def _joined(tree: Any, place: Floats, residual: Floats, variance: Floats) -> tuple[Floats, Floats]:

@@ -34,7 +34,7 @@ class Pieces(Columns):
     """Consecutive rows of one reading in one part of a cell, as arrays (m,).
 
     ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` driven; ``x``, ``y`` and their
-    four SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The signs of x and y
+    five SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The signs of x and y
     are reversed for braked wheels.
     """
 
@@ -46,6 +46,7 @@ class Pieces(Columns):
     x: Floats
     y: Floats
     constant: Floats
+    local: Floats
     random: Floats
     x_constant: Floats
     x_random: Floats
@@ -85,10 +86,10 @@ def pieces_of(reading: Reading, time: Floats, way: Floats, size: float, run: int
 
     y = total(reading.y)
     turned = np.where(y < 0, -1.0, 1.0) if reading.turns else np.ones(len(y))
-    spreads = [total(getattr(reading, name)) for name in ("constant", "random", "x_constant", "x_random")]
     pieces = Pieces(
         column[begin], line[begin], np.full(len(begin), run), time[rows][begin], total(np.ones(len(time))), turned * total(reading.x),
-        turned * y, spreads[0], spreads[1], spreads[2], spreads[3], np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
+        turned * y, total(reading.constant), total(reading.local), total(reading.random), total(reading.x_constant),
+        total(reading.x_random), np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
     )  # fmt: skip
     return pieces.where(pieces.metres > 0)
 
@@ -99,7 +100,8 @@ def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     A cell's value is Σ y/Σ x: random errors of x average out and do not reduce it, as they would in least squares. Its variance is
     the larger of two, plus that of the constants, which no number of passes reduces. The first is the scatter of the pieces
     (K Σ metres/(Σ x)², K pooled over the map: variation of the ground within a cell, and random errors over a piece). The second is
-    the estimator's own random variance, once for every `correlated` metres of wheel travel.
+    the estimator's own random variance, once for every `correlated` metres of wheel travel. Errors that rows nearby share are added whole,
+    whatever the passes: all may lie on one side of a hill.
     """
     joined = Pieces.joined(parts)
     joined = joined.where(np.lexsort((joined.time, joined.run, joined.row, joined.column)))
@@ -146,7 +148,8 @@ def _summed(pieces: Pieces, start: Bools, scatter: float, correlated: float, pas
     random = np.hypot(total(pieces.random) / safe, value * x_share)
     constant = np.hypot(total(pieces.constant) / safe, value * total(pieces.x_constant) / safe)
     once = np.minimum(1.0, correlated / np.maximum(metres, 1e-9))
-    std = np.sqrt(np.maximum(scatter * metres / safe**2, random**2 * once) + constant**2)
+    local = total(pieces.local) / safe
+    std = np.sqrt(np.maximum(scatter * metres / safe**2, random**2 * once) + local**2 + constant**2)
     rows = np.add.reduceat(pieces.rows, begin).astype(np.int64) if len(begin) else np.zeros(0, dtype=np.int64)
     headland = total(pieces.metres * pieces.headland) / np.maximum(metres, 1e-9)
     cells = Cells(

@@ -37,7 +37,8 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
     """From the first to the last pass of each cell, in the order of the runs and of time.
 
     `passes`: one row per pass (:func:`terragrip.maps.cells.cells_of`). On one machine constants that all passes share cannot cause a
-    change; between machines each has its own. `significant` controls the false discovery rate at `share`.
+    change, except by what they weigh more in one of them (at another slip, say); between machines each has its own. `significant`
+    controls the false discovery rate at `share`.
     """
     from scipy.special import ndtr
 
@@ -50,8 +51,9 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
     several = end > begin
     first, last = order[begin[several]], order[end[several]]
     variance = passes.std**2 - (passes.constant**2 if same_machine else 0.0)
+    left = passes.constant[last] - passes.constant[first] if same_machine else 0.0
     difference = passes.value[last] - passes.value[first]
-    std = np.sqrt(np.maximum(variance[first] + variance[last], 1e-18))
+    std = np.sqrt(np.maximum(variance[first] + variance[last] + left**2, 1e-18))
     p = 2 * ndtr(-np.abs(difference) / std)
     same = passes.run[first] == passes.run[last]
     return Changes(

@@ -18,36 +18,36 @@ from terragrip.maps.places import Places, has_positions, places_of, zone_of
 from terragrip.maps.points import Points, points_of
 from terragrip.maps.repeats import WORTH_A_WORD, scaled, share_of_repeats
 from terragrip.maps.soils import SoilWay, soil_of_cells, soil_way
-from terragrip.maps.values import QUANTITIES, readings_of
+from terragrip.maps.values import QUANTITIES, readings_of, usual_slip
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
-REFERENCE_SLIP = 0.2
-"""Slip that adhesion is mapped at by default."""
 GROUND = ("adhesion", "soil_resistance")
 """What is the ground's own, and searched for anomalies; slip and efficiency answer to the load too, and slip stands in where it is all."""
 READ_BY_WHEELS = ("adhesion", "slip", "efficiency")
 """What repeated passes tell the errors of; the resistance's are mostly those of slope and drawbar, which stay the same in each pass."""
 MOST_CELLS = 50_000_000
 """Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
-LARGE_MACHINE = 1000.0
-"""kg: by default heavier machines are mapped by their working width, or by `LARGE_CELL` where it is not known, lighter ones by
-`SMALL_CELL`."""
-LARGE_CELL, SMALL_CELL = 3.0, 1.0
+METRE_MACHINE = 139.0
+"""kg of a machine with cells of 1 m, the paper's robot; those of others are as their length, the cube root of their mass ..."""
+CELLS = (0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""... and in these sizes [m]."""
+COARSE = 3.0
+"""Times the scatter of the positions that a cell is at least: smaller ones show rounding and noise."""
 FARTHEST = 100_000.0
 """Metres from the first run beyond which another is no part of its map: the grid would be another zone's."""
 
 
 @dataclass(frozen=True)
 class MapSettings:
-    """Settings of a map: ``cell`` [m] (None: from the machine), ``reference_slip``, ``datum`` of the positions, ``fill``: number of cell
-    sizes to krige beyond the driven cells (0: none)."""
+    """Settings of a map: ``cell`` [m] (None: from the machine), ``reference_slip`` (None: near the first run's own), ``datum`` of the
+    positions, ``fill``: number of cell sizes to krige beyond the driven cells (0: none)."""
 
     cell: float | None = None
-    reference_slip: float = REFERENCE_SLIP
+    reference_slip: float | None = None
     datum: str = "EPSG:4326"
     fill: float = 0.0
 
@@ -84,6 +84,7 @@ class MapMaker:
     notes: list[str] = field(default_factory=list)
     _epsg: int = 0
     _cell: float = 0.0
+    _slip: float = 0.0
     _correlated: float = 0.0
     _middle: tuple[float, float] = (0.0, 0.0)
     _origin: tuple[float, float] = (0.0, 0.0)
@@ -100,8 +101,8 @@ class MapMaker:
                 "has no positions", file=file or run, hint="estimate a log with latitude and longitude"
             )
         epsg = self._epsg or zone_of(estimates["latitude"], estimates["longitude"])
-        cell = self._cell or self.settings.cell or usual_cell(vehicle)
         places = places_of(estimates, epsg, self.settings.datum, file)
+        cell = self._cell or self.settings.cell or usual_cell(vehicle, places.scatter)
         self._check_extent(places, cell, file or run)
         if not self.runs:
             self._begin(estimates, places, epsg, cell)
@@ -114,7 +115,7 @@ class MapMaker:
                 f"{run}: the vehicle file has no antenna; it is assumed to be over the rear axle."
             )
         way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
-        for reading in readings_of(estimates, places, self.settings.reference_slip, self.library):
+        for reading in readings_of(estimates, places, self._slip, self.library):
             pieces = pieces_of(reading, estimates.time, way, self._cell, number, places.headland)
             self._parts.setdefault(reading.quantity, []).append(pieces)
         self._soil.append(soil_way(estimates, places, way, self._cell, self.ground.get(run, [])))
@@ -125,6 +126,7 @@ class MapMaker:
         vehicle = estimates.vehicle
         radius = float(vehicle.wheel_radius.mean()) if vehicle.knows_wheels else 0.5
         self._epsg, self._cell, self._correlated = epsg, cell, CORRELATED * radius
+        self._slip = self.settings.reference_slip or usual_slip(estimates)
         self._origin = float(np.nanmedian(places.east)), float(np.nanmedian(places.north))
         self._middle = (
             float(np.nanmedian(estimates["latitude"])),
@@ -176,6 +178,11 @@ class MapMaker:
                 "no row with a position shows the ground",
                 hint="drive, with positions",
             )
+        if len(cells.get("adhesion", ())) < 0.5 * len(cells.get("soil_resistance", ())):
+            self.notes.append(
+                f"adhesion: {len(cells.get('adhesion', ()))} of {len(cells['soil_resistance'])} cells; in the others slip was too low or "
+                "too uncertain to show it. Take larger cells (--cell), or map the same ground with more pull."
+            )
         judged = GROUND if any(name in cells for name in GROUND) else ("slip",)
         anomalies = {name: anomalies_of(cells[name]) for name in judged if name in cells}
         one = len(self._machines) == 1
@@ -188,15 +195,17 @@ class MapMaker:
             cells = {name: filled(one, self.settings.fill) for name, one in cells.items()}
         return FieldMap(
             self._epsg, self._cell, cells, passes, anomalies, changes, soil_of_cells(self._soil), Points.joined(self._points),
-            tuple(self.runs), self.settings.reference_slip, self.settings.datum, self._middle, tuple(self.notes),
+            tuple(self.runs), self._slip, self.settings.datum, self._middle, tuple(self.notes),
         )  # fmt: skip
 
 
-def usual_cell(vehicle: Vehicle) -> float:
-    """Size of a cell [m] if the user gives none."""
-    if vehicle.mass <= LARGE_MACHINE:
-        return SMALL_CELL
-    return vehicle.working_width or LARGE_CELL
+def usual_cell(vehicle: Vehicle, scatter: float = 0.0) -> float:
+    """Size of a cell [m] if the user gives none: the working width, or by the machine's size where it is not stated; not less than
+    `COARSE` times the ``scatter`` [m] of the positions."""
+    by_mass = np.cbrt(vehicle.mass / METRE_MACHINE)
+    size = vehicle.working_width or min(CELLS, key=lambda size: abs(np.log(size / by_mass)))
+    least = next((size for size in CELLS if size >= COARSE * scatter), CELLS[-1])
+    return float(max(size, least))
 
 
 def _enough(long: float, wide: float) -> float:

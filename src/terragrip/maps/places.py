@@ -10,6 +10,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.maps.plausible import refuse_impossible
+from terragrip.physics.geodesy import metres_of
 from terragrip.recording.lag import lag_between, speed_of, wheels_of
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ JUMP = 0.5
 JUMP_SHARE = 0.3
 LATEST = 2.0
 """Seconds by which positions are looked for behind the wheels at most."""
+LEAST_STEPS = 12
+"""Different positions along an axis, less one, that show to which step they are rounded."""
 LEAST_FIXES = 5
 """Fixes between two jumps or outages; fewer are taken for strays."""
 TURNED = np.radians(25.0)
@@ -44,6 +47,7 @@ class Places:
     north: Floats
     heading: Floats
     headland: Bools
+    scatter: float = 0.0
     notes: tuple[str, ...] = ()
 
     def of(self, forward: float, left: float) -> tuple[Floats, Floats]:
@@ -86,7 +90,10 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     east, north = _projected(latitude[fixes], longitude[fixes], epsg, datum)
     late, notes = _late(estimates, estimates.time[fixes], east, north)
     when = estimates.time[fixes] - late
-    piece, cut = _pieces(when, np.interp(when, estimates.time, way), east, north)
+    driven = np.diff(np.interp(when, estimates.time, way))
+    excess = np.hypot(np.diff(east), np.diff(north)) - driven
+    usual = _scatter(excess)
+    piece, cut = _pieces(when, driven, excess, usual)
     notes += cut
     x, y = _between(estimates.time, when, east, piece), _between(estimates.time, when, north, piece)
     heading = _heading(x, y, way, _base(vehicle), np.nan_to_num(estimates["ground_speed"]))
@@ -94,7 +101,14 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     if antenna is not None:
         cosine, sine = np.cos(heading), np.sin(heading)
         x, y = x - antenna.x * cosine + antenna.y * sine, y - antenna.x * sine - antenna.y * cosine
-    return Places(x, y, heading, _headland(heading, way), notes)
+    return Places(
+        x,
+        y,
+        heading,
+        _headland(heading, way),
+        max(usual, 0.5 * _step(latitude[fixes], longitude[fixes])),
+        notes,
+    )
 
 
 def _base(vehicle: Vehicle) -> float:
@@ -148,13 +162,24 @@ def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tu
     return lag.seconds, (word,)
 
 
-def _pieces(time: Floats, way: Floats, east: Floats, north: Floats) -> tuple[Ints, tuple[str, ...]]:
-    """The number of the unbroken piece of each fix (n,), -1 for strays; sentences on removed positions."""
+def _scatter(excess: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(excess - np.median(excess)))) if len(excess) else 0.0
+
+
+def _step(latitude: Floats, longitude: Floats) -> float:
+    """The step [m] to which positions are rounded: the smallest difference between two of them along either axis."""
+    gaps = [np.diff(np.unique(np.round(along, 4))) for along in metres_of(latitude, longitude)]
+    return max(float(gap.min()) if len(gap) >= LEAST_STEPS else 0.0 for gap in gaps)
+
+
+def _pieces(time: Floats, driven: Floats, excess: Floats, usual: float) -> tuple[Ints, tuple[str, ...]]:
+    """The number of the unbroken piece of each fix (n,), -1 for strays; sentences on removed positions.
+
+    Of the steps (n - 1,) the way ``driven`` and the ``excess`` of the positions over it [m], with its ``usual`` scatter.
+    """
     if len(time) < 2:
         return np.full(len(time), -1), ("There are fewer than two positions.",)
-    step, driven, wait = np.hypot(np.diff(east), np.diff(north)), np.diff(way), np.diff(time)
-    excess = step - driven
-    usual = 1.4826 * float(np.median(np.abs(excess - np.median(excess))))
+    wait = np.diff(time)
     jump = np.abs(excess - np.median(excess)) > JUMP + 8 * usual + JUMP_SHARE * driven
     outage = (wait > max(OUTAGE_TIME, 5 * float(np.median(wait)))) & (driven > OUTAGE_WAY)
     piece = np.r_[0, np.cumsum(jump | outage)]
