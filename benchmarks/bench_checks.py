@@ -3,10 +3,11 @@
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
 The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, rest.py,
-torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, and torques.py's least
-thrust. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
-the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques
-without a sign into all logs that have negative ones); one is found where its own note comes.
+torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, torques.py's least
+thrust, steps.py's, rescaled.py's and leaps.py's, and the stretch of mechanics.py. Right logs are development drives of three chassis
+(sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log
+of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that have negative ones); one
+is found where its own note comes.
 
 --write puts the table into docs/formats.md.
 """
@@ -32,6 +33,7 @@ from terragrip.errors import InputError
 from terragrip.formats import read
 from terragrip.recording import Recording, unit_warnings
 from terragrip.simulation import families
+from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
 BEGIN = "<!-- made by benchmarks/bench_checks.py --write -->"
@@ -49,9 +51,13 @@ LIMITS = {
     "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
-    "pitch": "_LONG _MOVED _BEYOND _STAYS",
+    "pitch": "_LONG _MOVED _BEYOND",
+    "steps": "_STAYS",
+    "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
+    "leaps": "_LEAST _BEYOND _SURE _HALF _REST",
+    "mechanics": "_STRETCH",
     "sides": "_APART",
-    "rolling": "_PULLING _MOST",
+    "rolling": "_PULLING _MOST _RADII_SURE _SLOWER_LEAST",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
 SHARES = {("pace", "_OFTEN"), ("rolling", "_MOST"), ("turn_rates", "_ALIKE")}
@@ -210,7 +216,32 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
             changed(log, "acceleration_x", by=lambda v: v / 9.80665),
             vehicle,
         )
+    yield (
+        "rim 1.1 times from the middle",
+        "its scale changed",
+        changed(log, first, by=lambda v: np.where(time > middle, 1.1 * v, v)),
+        vehicle,
+    )
+    yield (
+        "ground 1.1 times from the middle",
+        "go slower than their hubs",
+        changed(log, "ground_speed", by=lambda v: np.where(time > middle, 1.1 * v, v)),
+        vehicle,
+    )
+    yield (
+        "torques .5 times from the middle",
+        "neither the motion",
+        changed(log, "drive_torque", by=lambda v: np.where(time > middle, 0.5 * v, v)),
+        vehicle,
+    )
     if "drawbar_force" in log.channels:
+        drift = 0.2 * vehicle.mass * STANDARD_GRAVITY * (time - time[0]) / (time[-1] - time[0])
+        yield (
+            "drawbar drifts by .2",
+            "drawbar_force drifts",
+            changed(log, "drawbar_force", by=lambda v: v + drift),
+            vehicle,
+        )
         balance = "In starts and stops"
         yield "torques 1.5 times", balance, changed(log, "drive_torque", by=lambda v: 1.5 * v), vehicle
         yield "mass 1.6 times", balance, log, with_mass(vehicle, 1.6)

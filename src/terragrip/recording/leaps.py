@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _SLOWEST = 0.15  # s between samples, 10 Hz with jitter: within more a speed control answers, and soil changes under the wheels
 _SURE = 5.0  # standard deviations of its steps: no sample of a log leaps so far by chance
+_LEAST = 0.05  # of the weight, or `PULL` beyond twice the next: leaps of right logs were .038 and 1.6 times at most (six on 156 drives)
 _BEYOND = 3.0  # standard deviations of what the balance is left with all the time, as soil and hills change
 _HALF = 0.5  # of it, at least, is between two samples
 _REST = 0.25  # of it, at most, is answered, or gone again
@@ -103,7 +104,10 @@ def _unanswered(recording: Recording, drive: _Drive, parts: dict[str, Floats], c
         return []
     thrust = np.sum([filled(drive.time, part) for part in parts.values()], axis=0)
     left = drive.shift(thrust - filled(drive.time, climb)) - drive.motion
-    least = max(PULL * STANDARD_GRAVITY, _BEYOND * MAD_TO_SD * median(np.abs(left[drive.inside])))
+    spread = MAD_TO_SD * median(np.abs(left[drive.inside]))
+    least = min(
+        max(_LEAST * STANDARD_GRAVITY, _BEYOND * spread), max(PULL * STANDARD_GRAVITY, 2 * _BEYOND * spread)
+    )
     leaps = {name: _leaps(drive, part) for name, part in parts.items()}
     leap = np.sum(list(leaps.values()), axis=0)
     rows = drive.inside & (np.abs(leap) > least) & (np.abs(left - leap) < _REST * np.abs(leap))

@@ -35,6 +35,7 @@ _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
 _FACTOR = 1.8  # larger than an uncalibrated torque and an estimated mass change a force balance
 PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
+_STRETCH = 20  # windows in which the balance leaves less than nothing (on right logs it left .036 of the weight at least)
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
@@ -142,6 +143,30 @@ def motion_warnings(
     else:
         found = _thrust_warnings(means, thrusts, vehicle)
     return [*notes, *found]
+
+
+def shortfall_warnings(recording: Recording, means: Means | None, thrusts: dict[str, Floats]) -> list[str]:
+    """A sentence where less than nothing is left of the thrust for `_STRETCH` windows, by the pull and what shows hills; ``thrusts``: those
+    of `thrusts_of`."""
+    hills = "acceleration_x" in recording.channels or (means is not None and means.climb is not None)
+    if means is None or not thrusts or not hills or "drawbar_force" not in recording.channels:
+        return []
+    rest = (np.sum(list(thrusts.values()), axis=0) - means.moved(recording)) / STANDARD_GRAVITY
+    known = np.flatnonzero(np.isfinite(rest))
+    if len(known) < 2 * _STRETCH:
+        return []
+    total = np.r_[0.0, np.cumsum(rest[known])]
+    low = np.flatnonzero(total[_STRETCH:] - total[:-_STRETCH] < -PULL * _STRETCH)
+    if not len(low):
+        return []
+    first, last = low[0], low[-1] + _STRETCH - 1
+    inside = rest[known[first : last + 1]]
+    begin, end = recording.time[0] + (np.flatnonzero(means.rows)[known[[first, last]]] + 0.5) * means.length
+    return [
+        f"From about {begin:.4g} to {end:.4g} s the drive torques over the wheel radius less drawbar_force are {-np.mean(inside):.2g} of "
+        "the weight too little to move the vehicle, even without resistance: the zero of drawbar_force drifts, or the scale of one of them "
+        "changed. Correct these cells, or leave them empty."
+    ]
 
 
 def _ratio(pair: Floats) -> float:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
-from terragrip.recording.noise import MAD_TO_SD
-from terragrip.recording.ranks import median
+from terragrip.recording.steps import step_of
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -26,7 +25,6 @@ _BLOCKS = 20  # of windows, for the jackknife: with half as many, right logs had
 _LONG = 20  # windows before and after a zero moves
 _MOVED = 0.2  # m/s², .02 of the weight: calibrated zeros are known to .03, and warm up by less than this
 _BEYOND = 6.0  # standard deviations of a window
-_STAYS = 3.0  # times what it changes from half to half of either side
 _CAUSES = (
     (1.745, "the grade in per cent, declared as degrees: write 'unit: \"%\"'"),
     (100.0, "the grade in per cent: write 'unit: \"%\"'"),
@@ -68,22 +66,11 @@ def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[s
         return []
     rest = forward - means.change - means.climb
     known = np.isfinite(rest)
-    rest, count = rest[known], int(known.sum())
-    if count < 2 * _LONG:
+    step = step_of(rest[known], _MOVED, beyond=_BEYOND, long=_LONG)
+    if step is None:
         return []
-    place = np.arange(_LONG, count - _LONG + 1)
-    total = np.cumsum(rest)
-    apart = (total[-1] - total[place - 1]) / (count - place) - total[place - 1] / place
-    at = int(place[np.argmax(np.abs(apart) * np.sqrt(place * (count - place)))])
-    sides = rest[:at], rest[at:]
-    low, high = (median(side) for side in sides)
-    leap = high - low
-    scatter = MAD_TO_SD * median(np.abs(np.r_[sides[0] - low, sides[1] - high]))
-    halves = [part for side in sides for part in np.array_split(side, 2)]
-    drift = max(abs(median(halves[k]) - median(halves[k + 1])) for k in (0, 2))
-    if not abs(leap) > max(_MOVED, _BEYOND * scatter, _STAYS * drift):
-        return []
-    when = recording.time[0] + (np.flatnonzero(means.rows)[known][at] - 0.5) * means.length
+    leap = step.size
+    when = recording.time[0] + (np.flatnonzero(means.rows)[known][step.at] - 0.5) * means.length
     return [
         f"From {when:.4g} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
         f"before: the zero of one of the two moved, and soil resistance is {abs(leap) / STANDARD_GRAVITY:.2g} off before or after. Correct "

@@ -21,11 +21,12 @@ from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.recording.frozen import frozen_warnings
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
-from terragrip.recording.mechanics import Means, means_of, motion_warnings, thrusts_of
+from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
 from terragrip.recording.plain_units import angle_warnings, gravity_warnings, spacing_warnings
 from terragrip.recording.position_speed import position_warnings
 from terragrip.recording.replays import replay_warnings
+from terragrip.recording.rescaled import rescaled_warnings
 from terragrip.recording.rest import rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import slower_warnings
@@ -133,7 +134,7 @@ _TIME = ("clock",)
 """Every other check is by time,"""
 _WAY = (*_TIME, "against")
 """and takes it that rims and ground go one way."""
-_SPEEDS = (*_WAY, "sides", "rims", "free axles")
+_SPEEDS = (*_WAY, "rescaled", "sides", "rims", "free axles")
 _COURSES = (*_SPEEDS, "positions")
 _FORCES = (*_WAY, "signs", "motion", "acceleration", "zeros", "leaps")
 
@@ -147,8 +148,9 @@ _EACH = (
         lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
         (*_SPEEDS, "signs", "motion", "acceleration", "frozen", "dropouts"),
     ),
-    Check("sides", lambda log: log.sides[0], _WAY),
-    Check("uneven torques", lambda log: log.sides[1], _WAY),
+    Check("rescaled", lambda log: rescaled_warnings(log.rows, log.vehicle, log.turn, log.track), _WAY),
+    Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
+    Check("uneven torques", lambda log: log.sides[1], (*_WAY, "rescaled")),
     Check("drive train", lambda log: drive_train_warnings(log.rows), _WAY, needs_wheels=False),
     Check("drift", lambda log: drift_warnings(log.rows), _WAY, needs_wheels=False),
     Check(
@@ -189,6 +191,11 @@ _EACH = (
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
         (*_COURSES, *_FORCES, "torques"),
+    ),
+    Check(
+        "shortfall",
+        lambda log: shortfall_warnings(log.rows, log.means, log.thrusts),
+        (*_COURSES, *_FORCES, "torques", "balance"),
     ),
     Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
     Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means, log.thrusts), _WAY),

@@ -31,7 +31,11 @@ _SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
 _PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
 _MOST = 0.75  # of the windows with such a thrust
 _RADII = 0.01  # radii that are known so well are right
-_SLOWER = 0.1  # of the hub's speed: radii are known to that
+_SLOWER = 0.1  # of the hub's speed: radii are known to that, or
+_RADII_SURE, _SLOWER_LEAST = (
+    4.0,
+    0.04,
+)  # to so many of the file's standard deviations, and a receiver's errors
 
 
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
@@ -107,6 +111,8 @@ def slower_warnings(
     usable = straight if turn is None else np.isfinite(yaw)
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
     least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+    stated = vehicle.uncertainty.wheel_radius
+    slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
     found: dict[str, tuple[float, float]] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
@@ -114,7 +120,7 @@ def slower_warnings(
             continue
         rim = radius * window_means(spin, means.place, means.count)[means.rows]
         hub, thrust = means.speed - yaw * sides[wheel], means.of(torque) / radius
-        rows = (hub - rim > _SLOWER * hub) & (thrust > least) & usable
+        rows = (hub - rim > slower * hub) & (thrust > least) & usable
         stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
         if stretch:
             found[wheel] = stretch
@@ -127,6 +133,6 @@ def slower_warnings(
         else "their speeds are"
     )
     return [
-        f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {_SLOWER:.0%} while they "
+        f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
         f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
     ]

@@ -43,10 +43,10 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
     Without one the vehicle drives straight ahead where the rims of all axles agree; a difference on a single axle is then checked where the
     others agree.
     """
-    drive = _Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
+    drive = Drive.of(recording, vehicle, np.zeros(len(recording)) if turn is None else turn)
     if drive is None:
         return [], []
-    straight = drive.driving & (np.abs(drive.hubs) < _STRAIGHT * drive.pace)
+    straight = drive.straight
     if turn is None:
         level = [np.abs(np.diff(axle.rims, axis=0)[0]) < _STRAIGHT * drive.pace for axle in drive.axles]
         rolling = _rolling_apart(drive.axles, straight, level)
@@ -62,7 +62,7 @@ def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | Non
 
     Other errors of speeds, torques and yaw rate look the same: use this only where no other was found.
     """
-    drive = None if turn is None else _Drive.of(recording, vehicle, turn)
+    drive = None if turn is None else Drive.of(recording, vehicle, turn)
     if drive is None:
         return []
     odd = [
@@ -79,7 +79,7 @@ def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | Non
 
 
 @dataclass(frozen=True)
-class _Axle:
+class Axle:
     """Window means of an axle's outer wheels (2, n), left and right: ``rims`` [m/s] and ``pulls`` [N], the latter None without torques."""
 
     name: str
@@ -90,29 +90,37 @@ class _Axle:
 
 
 @dataclass(frozen=True)
-class _Drive:
-    """Axles in windows (n,): their mean ``pace`` and the difference of their ``hubs`` in turns [m/s], whether they are ``driving``,
-    and the sum of all turns (``turned``) [rad]."""
+class Drive:
+    """Axles in windows (n,) with the middles ``when`` [s]: their mean ``pace`` and the difference of their ``hubs`` in turns [m/s],
+    whether they are ``driving``, and the sum of all turns (``turned``) [rad]."""
 
-    axles: tuple[_Axle, ...]
+    axles: tuple[Axle, ...]
+    when: Floats
     pace: Floats
     hubs: Floats
     driving: Bools
     turned: float
 
     @classmethod
-    def of(cls, recording: Recording, vehicle: Vehicle, turn: Floats) -> _Drive | None:
+    def of(cls, recording: Recording, vehicle: Vehicle, turn: Floats) -> Drive | None:
         """None without a track, axles of two sides, or enough windows."""
         if not vehicle.track or np.any(np.diff(recording.time) < 0):
             return None
-        axles, shown = _axles(recording, vehicle, turn)
+        axles, when, shown = _axles(recording, vehicle, turn)
         if not axles or len(shown) < _LEAST:
             return None
         pace = np.abs(np.mean([axle.rims for axle in axles], axis=(0, 1)))
         turned = WINDOW * float(np.abs(shown).sum())
-        return cls(tuple(axles), pace, vehicle.track * shown, pace > _DRIVING * quantile(pace, 0.95), turned)
+        return cls(
+            tuple(axles), when, pace, vehicle.track * shown, pace > _DRIVING * quantile(pace, 0.95), turned
+        )
 
-    def contradicts(self, axle: _Axle) -> bool:
+    @property
+    def straight(self) -> Bools:
+        """Windows (n,) of driving straight ahead, by the turn."""
+        return self.driving & (np.abs(self.hubs) < _STRAIGHT * self.pace)
+
+    def contradicts(self, axle: Axle) -> bool:
         """Whether an axle's torques, apart from the part due to pace and pull, oppose the slips from side to side."""
         rows = self.driving
         if axle.pulls is None or rows.sum() < _LEAST or self.turned < LEAST_TURN:
@@ -126,10 +134,10 @@ class _Drive:
         return hard > _TURNING * axle.load / 2 and float(np.mean(slip * pull)) < -_OPPOSED * size
 
 
-def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_Axle], Floats]:
-    """Axles of two sides with both speeds known, and the turn, as means over the windows that have them all."""
+def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[Axle], Floats, Floats]:
+    """Axles of two sides with both speeds known, time, and the turn, as means over the windows that have them all."""
     radius, channels = vehicle.radii, recording.channels
-    rows: list[Floats] = [turn]
+    rows: list[Floats] = [recording.time, turn]
     found: list[tuple[str, tuple[str, str], float, int, bool]] = []
     for name, axle in vehicle.axles.items():
         sides = (axle.wheels[0], axle.wheels[-1])
@@ -147,13 +155,13 @@ def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[_
         )
     means = windows(recording.time, np.array(rows))
     axles = [
-        _Axle(name, sides, load, means[at : at + 2], means[at + 2 : at + 4] if powered else None)
+        Axle(name, sides, load, means[at : at + 2], means[at + 2 : at + 4] if powered else None)
         for name, sides, load, at, powered in found
     ]
-    return axles, means[0]
+    return axles, means[0], means[1]
 
 
-def _rolling_apart(axles: tuple[_Axle, ...], driving: Bools, level: list[Bools]) -> list[str]:
+def _rolling_apart(axles: tuple[Axle, ...], driving: Bools, level: list[Bools]) -> list[str]:
     """Rims of one axle with different speeds where all others' are alike (``level``), where nothing else shows the turn."""
     if len(axles) < 2:
         return []
@@ -164,7 +172,7 @@ def _rolling_apart(axles: tuple[_Axle, ...], driving: Bools, level: list[Bools])
     return notes if len(notes) == 1 else []
 
 
-def _rolling(axle: _Axle, straight: Bools, least: float) -> list[str]:
+def _rolling(axle: Axle, straight: Bools, least: float) -> list[str]:
     """Rims with speeds straight ahead that differ by the logarithm ``least`` or more."""
     left, right = axle.rims[:, straight]
     if straight.sum() < _LEAST or (right == 0).any():
@@ -183,7 +191,7 @@ def _rolling(axle: _Axle, straight: Bools, least: float) -> list[str]:
     ]
 
 
-def _opposed(axle: _Axle, straight: Bools) -> list[str]:
+def _opposed(axle: Axle, straight: Bools) -> list[str]:
     """Torques that rise on one side where they fall on the other, straight ahead."""
     if axle.pulls is None or straight.sum() < _LEAST:
         return []
@@ -204,7 +212,7 @@ def _opposed(axle: _Axle, straight: Bools) -> list[str]:
     ]
 
 
-def _share(axle: _Axle, pulls: Floats, straight: Bools) -> float | None:
+def _share(axle: Axle, pulls: Floats, straight: Bools) -> float | None:
     """The logarithm of an axle's left pull over its right one, None where it is not steady.
 
     Where it pulls little an offset of a torque would count as much as its scale: there, of the pulls' changes.
@@ -223,9 +231,9 @@ def _share(axle: _Axle, pulls: Floats, straight: Bools) -> float | None:
     )
 
 
-def _uneven(axles: tuple[_Axle, ...], straight: Bools) -> list[str]:
+def _uneven(axles: tuple[Axle, ...], straight: Bools) -> list[str]:
     """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike."""
-    shares: dict[str, tuple[float, _Axle]] = {}
+    shares: dict[str, tuple[float, Axle]] = {}
     for axle in axles:
         if axle.pulls is None:
             continue
