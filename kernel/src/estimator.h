@@ -111,6 +111,7 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real wander, bumps;           /* mean squares of rho_s about both: what soil and bumps do within metres, and bumps alone */
     tg_real own_resistance;          /* mean variance of rho_s, by the filter */
     tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
+    tg_real waited;                  /* wheel radii since a row held a wheel's speed */
 } tgi_roughness;
 
 typedef struct { /* slips of the driven wheels in a row; 0 of others */
@@ -338,14 +339,15 @@ tg_real tgi_unseen_grade(const tg_estimator *e);
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance);
 
 /* hidden.c */
-void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh);
+void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled);
 tg_real tgi_by_load(const tg_estimator *e, tg_real scatter);
 
 /* warp.c */
 tgi_slips tgi_driven_slips(const tg_estimator *e);
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
-void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain);
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh);
+void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled);
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 
 /* slow_speed.c */

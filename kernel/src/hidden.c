@@ -82,9 +82,8 @@ static void end_stretch(tg_estimator *e)
     memset(now, 0, sizeof *now);
 }
 
-/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh`: its weight over the length of unevenness. `flowing`:
- * the row goes on from that one. */
-void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh)
+/* After a row that holds a wheel's speed, `travelled` wheel radii behind the last such row; `flowing`: it goes on from that one. */
+void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled)
 {
     tgi_hidden *h = &e->hidden;
     const tg_real *const mu = e->belief.x, *const at_rest = e->constants.at_rest;
@@ -96,6 +95,7 @@ void tgi_watch_hidden(tg_estimator *e, const tgi_slips *slips, int32_t flowing, 
         h->way = 0;
         return;
     }
+    const tg_real fresh = travelled / (e->settings.tuned.uneven_length + travelled);
     const tg_real gain = h->way > 0 ? tgi_max(fresh, travelled / (h->way + travelled)) : 1; /* a plain mean at first */
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
         if (!(e->constants.pulls[i] > 0)) continue;

@@ -44,6 +44,14 @@ static void watch_hills(tg_estimator *e, tg_real rho, tg_real travelled)
     r->swing += gain * (tgi_square(rho - r->usual) - r->swing);
 }
 
+/* Whether the row, the estimator's next one, holds a wheel's speed. Without any, slips are predicted by the torques alone. */
+static int32_t wheels_measured(const tg_estimator *e)
+{
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++)
+        if (e->wheel[i].count > 0 && e->wheel[i].time > e->time) return 1;
+    return 0;
+}
+
 /* After a row's estimate, `distance` m behind the one before. `flowing`: the row continues that one. */
 void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
 {
@@ -67,9 +75,14 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
         own /= (tg_real)driven;
     }
     if (e->constants.warps || e->constants.slopes) {
-        const tgi_slips slips = tgi_driven_slips(e);
-        if (e->constants.warps) tgi_watch_warp(e, &slips, flowing, travelled, fresh, gain);
-        if (e->constants.slopes && e->settings.method == TG_FILTERED) tgi_watch_hidden(e, &slips, flowing, travelled, fresh);
+        r->waited += travelled;
+        if (e->constants.warps) tgi_watch_warp(e, flowing, fresh);
+        if (e->settings.method == TG_FILTERED && (!flowing || wheels_measured(e))) {
+            const tgi_slips slips = tgi_driven_slips(e);
+            if (e->constants.warps) tgi_watch_slips(e, &slips, flowing, r->waited);
+            if (e->constants.slopes) tgi_watch_hidden(e, &slips, flowing, r->waited);
+            r->waited = 0;
+        }
     }
     const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
     count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);

@@ -179,14 +179,16 @@ static tg_real left_by_spin(const tg_estimator *e)
     return 1 / tgi_square(beyond_line(k, far, c->work / tgi_max(e->warped.slipping, k->least_slip)));
 }
 
-/* Slips as if the vehicle did not turn: what a turn does is a trend, and a gyroscope's noise is none. */
-static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travelled, tg_real gain)
+/* After a row that holds a wheel's speed, `travelled` wheel radii behind the last such row; `flowing`: it continues that one. Slips as if
+ * the vehicle did not turn: what a turn does is a trend, and a gyroscope's noise is none. */
+void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled)
 {
     tgi_warped *w = &e->warped;
     const tgi_constants *c = &e->constants;
     const tg_real *const slip = slips->straight;
+    const tg_real gain = travelled / (e->settings.tuned.uneven_memory + travelled);
     tg_real warp[TG_MAX_WHEELS], square = 0, pull = 0, all = 0;
-    if (!slips->known) {
+    if (!flowing || !slips->known) {
         memset(w->slip, 0, sizeof w->slip);
         return;
     }
@@ -216,15 +218,13 @@ static void watch_slips(tg_estimator *e, const tgi_slips *slips, tg_real travell
     w->slipping = usual_slip(e, w->slipping);
 }
 
-/* After a row's estimate, `travelled` wheel radii behind the one before; `fresh` and `gain`: its weights over the length and the memory of
- * unevenness. `flowing`: the row continues that one; else its adhesions may be anything, and what lasted before stays. */
-void tgi_watch_warp(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled, tg_real fresh, tg_real gain)
+/* After a row's estimate; `fresh`: its weight over the length of unevenness. `flowing`: the row continues the one before; else its adhesions
+ * may be anything, and what lasted before stays. */
+void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh)
 {
     tgi_warped *w = &e->warped;
     warp_of_adhesions(e, w->now);
     for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
-    if (flowing && e->settings.method == TG_FILTERED) watch_slips(e, slips, travelled, gain);
-    else memset(w->slip, 0, sizeof w->slip);
 }
 
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips

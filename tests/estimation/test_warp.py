@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tests.estimation.drives import BEARING, MASS, RADIUS, TIRE, WHEELS, Drive, drive, robot
 
 from terragrip.estimation import Estimates, estimate
+from terragrip.recording import Recording
 
 WEIGHT = MASS * 9.81 / 4
 AXLES = ("front", "front", "rear", "rear")
@@ -206,3 +207,19 @@ def test_a_wheel_that_spun_alone_does_not_widen_the_rest_of_the_log() -> None:
     for wheel in WHEELS:
         true = made.truth[f"adhesion_{wheel}"][late]
         assert np.mean(estimates[f"adhesion_{wheel}_std"][late]) < 0.3 * np.mean(true)
+
+
+def test_slips_tell_the_same_where_channels_have_stamps_of_their_own() -> None:
+    """Between a wheel's samples its slip is only predicted: the diagonal's adhesion goes by the measured ones."""
+    made = slipping(drive(30.0, rate=25.0))
+    time, channels = made.recording.time, made.recording.channels
+    kinds = ("wheel", "drive", "ground", "drawbar")
+    stamps = np.concatenate([time + 0.01 * k for k in range(4)])
+    order = np.argsort(stamps)
+    spread = {name: np.full((4, len(time)), np.nan) for name in channels}
+    for name, rows in spread.items():
+        rows[next(k for k, kind in enumerate(kinds) if name.startswith(kind))] = channels[name]
+    apart = Recording(stamps[order], {name: rows.ravel()[order] for name, rows in spread.items()})
+    together, differ = told(made)[0], told(replace(made, recording=apart))[0]
+    at = np.isfinite(apart["wheel_speed_fl"])[apart.time > 10]
+    assert np.std(differ[at] - together) < 0.06 * np.std(together)
