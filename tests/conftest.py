@@ -47,6 +47,15 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+@pytest.fixture(scope="module")
+def small_forests() -> Generator[None]:
+    """Ground classifiers grow a fifth of their trees, which takes half of the time of learning from a few drives; scikit-learn's whole
+    forest is compared in test_classifier_parts.py, and the measured grounds of test_classifier_husky.py are told with it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("terragrip.ground.classification.forest._TREES", 20)
+        yield
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, Any, Any]:
     """All that importing every test file makes stays to the end: to look through it for garbage meanwhile took a quarter of the processor's

@@ -14,6 +14,8 @@ from terragrip.cli import main
 sys.path.insert(0, str(Path(__file__).parent / "ground" / "classification"))
 from classifier_drives import BODY, drive
 
+pytestmark = pytest.mark.usefixtures("small_forests")
+
 GROUNDS = ("hard", "loose")
 
 

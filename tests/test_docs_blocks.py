@@ -19,7 +19,7 @@ import typer
 import yaml
 
 import terragrip as tg
-from terragrip.cli.entry import app
+from terragrip.cli.entry import program
 from terragrip.formats.profile import Profile, Source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,7 +37,7 @@ def command_lines(page: Path) -> list[str]:
 
 def parse(words: list[str]) -> None:
     """Parse without running; raises click's own error on a command or an option that there is not."""
-    command: Any = typer.main.get_command(app)
+    command = program()
     path = "terragrip"
     while hasattr(command, "commands"):
         path, name, words = f"{path} {words[0]}", words[0], words[1:]

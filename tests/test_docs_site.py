@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "site"))
@@ -16,7 +15,7 @@ sys.path.insert(0, str(ROOT / "docs" / "site"))
 import make  # noqa: E402
 
 import terragrip as tg  # noqa: E402
-from terragrip.cli.entry import app  # noqa: E402
+from terragrip.cli.entry import program  # noqa: E402
 from terragrip.recording.schema import AXLE_CHANNELS, CHANNELS, WHEEL_CHANNELS  # noqa: E402
 
 
@@ -55,8 +54,7 @@ def test_the_site_is_whole_loads_nothing_from_elsewhere_and_finds_words(tmp_path
 
 def test_every_command_and_option_is_on_the_page_of_commands() -> None:
     page = make.GENERATED["commands"]()
-    root = typer.main.get_command(app)
-    for name, command in root.commands.items():  # type: ignore[attr-defined]
+    for name, command in program().commands.items():
         section = page.partition(f"## terragrip {name}\n")[2].partition("\n## ")[0]
         inner = getattr(command, "commands", {}).values()
         for parameter in [

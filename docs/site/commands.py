@@ -5,14 +5,12 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-import typer
-
-from terragrip.cli.entry import app
+from terragrip.cli.entry import program
 
 
 def page() -> str:
     """Markdown: a section a command, in the order of `terragrip --help`."""
-    root: Any = typer.main.get_command(app)
+    root = program()
     parts = [
         "# Commands",
         "`terragrip COMMAND --help` says the same in the terminal. Exit code 0: done; 2: the input or the call is unusable, one line says"

@@ -81,6 +81,7 @@ def scratch(place: Path) -> Iterator[None]:
         yield
 
 
+@pytest.mark.long  # test_a_worker_here_that_dask_gives_up_is_started_anew kills one too, and its nanny does not help
 @pytest.mark.usefixtures("scratch")
 def test_a_worker_that_is_killed_in_mid_task(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
@@ -185,7 +186,9 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
 
 
 @pytest.mark.usefixtures("scratch")
-def test_a_worker_here_that_dask_gives_up_is_started_anew(place: Path) -> None:
+def test_a_worker_here_that_dask_gives_up_is_started_anew(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The only worker is killed, and its nanny does not bring it back."""
     import dask
     from distributed import Nanny
@@ -199,8 +202,11 @@ def test_a_worker_here_that_dask_gives_up_is_started_anew(place: Path) -> None:
 
     fault = Fault(place, abandon)
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 s"}):
-        assert main(call(place, "--workers", 1, "--quiet")) == 0
-    assert not fault.is_alive()
+        assert main(call(place, "--workers", 1)) == 0
+    assert not fault.is_alive(), "no task was seen at work"
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert "0 failed" in said.out
     rows, reasons = whole(place / "out")
     assert (len(rows), reasons) == (7, {})
 

@@ -91,6 +91,7 @@ def test_colours_of_a_figure_follow_the_page_and_its_text_stays_text(drive: Driv
     ET.fromstring(inline.replace("xlink:", "").encode())
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("missing", ["truth", "recording", "labels", "nis"])
 def test_an_absent_input_leaves_a_sentence_not_an_error(drive: Drive, missing: str) -> None:
     run = drive()

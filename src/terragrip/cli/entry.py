@@ -9,6 +9,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, Any
 
 import typer
@@ -128,9 +129,15 @@ def _search_little_garbage() -> None:
     atexit.register(gc.freeze)
 
 
+@cache
+def program() -> Any:
+    """All commands as one group of click, made once: that takes 40 ms of the processor, and a process may call `main` many times."""
+    return typer.main.get_command(app)
+
+
 def _run(words: Sequence[str]) -> int:
+    command = program()
     # Parsing eats the list it is given, and the report needs the words.
-    command: Any = typer.main.get_command(app)
     if COMPLETION in os.environ:  # the shell asks what may follow; the answer goes to standard output
         return int(command.main(list(words), prog_name="terragrip", standalone_mode=False) or 0)
     try:

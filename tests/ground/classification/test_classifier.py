@@ -9,6 +9,8 @@ import pytest
 from classifier_drives import BODY, GROUNDS, drive, drives
 from terragrip import GroundClassifier, InputError, Recording
 
+pytestmark = pytest.mark.usefixtures("small_forests")
+
 TRAINED, HELD_OUT = range(1000, 1004), range(1010, 1013)
 
 

@@ -18,6 +18,8 @@ from hypothesis import strategies as st
 from classifier_drives import BODY, drive, drives
 from terragrip import GroundClassifier, InputError
 
+pytestmark = pytest.mark.usefixtures("small_forests")
+
 TABLES, LABELS = drives(range(1000, 1002), seconds=15.0)
 SHOWN = [drive("hard", 1010, 10.0), drive("rails", 1010, 10.0), drive("wet", 1010, 10.0).drop(columns=BODY)]
 

@@ -12,6 +12,8 @@ from classifier_drives import BODY, GROUNDS, drive, drives
 from terragrip import GroundClassifier
 from terragrip.ground.classification.labelled import read_labels
 
+pytestmark = pytest.mark.usefixtures("small_forests")
+
 TRAINED, HELD_OUT = range(1000, 1003), range(1010, 1012)
 
 
