@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from scipy.io import savemat
 
 from served import NEEDS, Served, axe_violations
+from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
 
@@ -148,6 +150,12 @@ def test_a_job_shows_the_command_line_that_does_the_same(
     page.reload()  # who comes back finds what follows, not "once there are estimates"
     page.wait_for_selector("#next-soils")
     assert page.inner_text("#see-estimate") == "See the drive: day1-estimates.parquet"
+    table = Estimates.read(folder / "day1-estimates.parquet")
+    kept = {name: rows for name, rows in table.columns.items() if not name.startswith("adhesion")}
+    replace(table, columns=kept).write(folder / "day1-estimates.parquet")
+    page.reload()  # of slip alone: two buttons led to jobs that must fail
+    page.wait_for_selector("#no-adhesion")
+    assert not page.query_selector("#next-soils, #next-ground")
     (folder / "day1-estimates.parquet").unlink()
     page.reload()
     page.wait_for_selector("text=ready to estimate")

@@ -27,6 +27,7 @@ _MOSTLY = (
     0.75  # of the rows in motion: a ground speed without a sign is that of forward driving in most of them
 )
 _FEWEST = 5  # windows
+_NOISY = 0.5  # of their size, by which large values of noise change at least
 _TOGETHER = 0.7  # correlation
 
 _WRONG = "in reverse turns the slips of both sides are wrong."
@@ -43,6 +44,8 @@ def against_warnings(recording: Recording) -> list[str]:
     for name in known[1:]:
         rim = channels[name]
         moving = _large(rim) & _large(ground)
+        if not (_is_motion(rim) and _is_motion(ground)):
+            continue
         if np.sum((rim * ground)[moving] < 0) > _MOSTLY * moving.sum():
             odd.append(name)
     if not odd:
@@ -107,6 +110,13 @@ def _turns(rate: Floats) -> Bools:
     """Which windows (n,) are turns, by the sharpest: in a drive with few of them noise is large beside most."""
     size = np.abs(rate)
     return size > _FAST * float(np.max(size, initial=0.0))
+
+
+def _is_motion(values: Floats) -> bool:
+    """Whether values (n,) change little from one to the next beside their size: the noise of a standstill has a sign by chance."""
+    known = values[np.isfinite(values)]
+    large = np.abs(known[_large(known)])
+    return len(large) > 1 and float(np.median(np.abs(np.diff(known)))) < _NOISY * float(np.median(large))
 
 
 def _large(values: Floats) -> Bools:

@@ -7,8 +7,9 @@ import type { Range } from "./gestures";
 import { within, type Drawn, type Values } from "./rows";
 import type { Panel } from "./run";
 
-function stretch([low, high]: Range, values: Values | undefined, first: number, last: number): Range {
+function stretch([low, high]: Range, values: Values | undefined, first: number, last: number, counts: (i: number) => boolean): Range {
   for (let i = first; values && i < last; i++) {
+    if (!counts(i)) continue;
     const v = values[i] as number;
     if (v < low) low = v; // NaN is neither
     if (v > high) high = v;
@@ -16,20 +17,45 @@ function stretch([low, high]: Range, values: Values | undefined, first: number, 
   return [low, high];
 }
 
+/** An interval so many times as wide as the median says that a row is hardly known, as after each standstill. */
+const HARDLY = 5;
+/** Rows that the median is taken of. */
+const SOME = 300;
+
+/** Whether a row is known well enough for the axis to follow it: one that is not would press the others flat. */
+function sureOf({ low, high }: Drawn, first: number, last: number): (i: number) => boolean {
+  if (!low || !high) return () => true;
+  const width = (i: number): number => (high[i] ?? NaN) - (low[i] ?? NaN);
+  const widths: number[] = [];
+  for (let i = first; i < last; i += Math.ceil((last - first) / SOME)) if (!Number.isNaN(width(i))) widths.push(width(i));
+  const most = HARDLY * (widths.sort((a, b) => a - b)[widths.length >> 1] ?? Infinity);
+  return (i) => !(width(i) > most);
+}
+
+export interface Extent {
+  /** Of all that is shown. */
+  all: Range;
+  /** Of the rows that are known, and of their intervals. */
+  values: Range;
+  bands: Range;
+}
+
 /** Smallest and largest value of the shown rows, and of their intervals. */
-export function extent(drawn: Drawn[], shown: Range): { values: Range; bands: Range } {
-  let values: Range = [Infinity, -Infinity];
-  let bands: Range = [Infinity, -Infinity];
+export function extent(drawn: Drawn[], shown: Range): Extent {
+  const nothing: Range = [Infinity, -Infinity];
+  let [all, values, bands] = [nothing, nothing, nothing];
   for (const one of drawn) {
     const [first, last] = within(one.x, shown);
-    values = stretch(values, one.values, first, last);
-    bands = stretch(stretch(bands, one.low, first, last), one.high, first, last);
+    const sure = sureOf(one, first, last);
+    all = stretch(all, one.values, first, last, () => true);
+    values = stretch(values, one.values, first, last, sure);
+    bands = stretch(stretch(bands, one.low, first, last, sure), one.high, first, last, sure);
   }
-  return { values, bands };
+  return { all, values, bands };
 }
 
 /** The range of the data: intervals inside what the panel shows by custom, values inside the most it can sensibly show. */
-export function limits({ values, bands }: { values: Range; bands: Range }, panel: Panel): Range {
+export function limits({ values, bands }: Extent, panel: Panel): Range {
   const [soft, hard]: Range[] = [
     [panel.low ?? -Infinity, panel.high ?? Infinity],
     [panel.least ?? panel.low ?? -Infinity, panel.most ?? panel.high ?? Infinity],
@@ -43,13 +69,13 @@ export function limits({ values, bands }: { values: Range; bands: Range }, panel
 }
 
 /** What is said of values that lie outside the axis, above and below it; empty where there are none. */
-export function outsideOf({ values }: { values: Range }, panel: Panel, [low, high]: Range): [string, string] {
+export function outsideOf({ all }: Extent, panel: Panel, [low, high]: Range): [string, string] {
   if (panel.log) return ["", ""];
-  return [values[1] > high ? `▲ up to ${digits(values[1])} ${panel.unit}` : "", values[0] < low ? `▼ down to ${digits(values[0])} ${panel.unit}` : ""];
+  return [all[1] > high ? `▲ up to ${digits(all[1])} ${panel.unit}` : "", all[0] < low ? `▼ down to ${digits(all[0])} ${panel.unit}` : ""];
 }
 
 /** Shown in the chart's corners: values beyond the axis are never hidden without a sign. */
-export function beyond(plot: uPlot, panel: Panel, found: { values: Range }): void {
+export function beyond(plot: uPlot, panel: Panel, found: Extent): void {
   const { min, max } = plot.scales["y"] ?? {};
   if (typeof min !== "number" || typeof max !== "number") return;
   const { ctx, bbox } = plot;

@@ -71,12 +71,14 @@ export function sameCurve(curve: Curve): boolean {
   return !!fit && fit.model === curve.model && Object.entries(fit.parameters).every(([name, v]) => Math.abs((curve.parameters[name] ?? 0) - v) < 1e-9);
 }
 
+/** At the lower right, where curves of adhesion leave room. */
 export function drawLegend(ink: Ink, view: View, curves: Curve[], soils: Soil[]): void {
-  let y = view.top + 12;
+  const top = view.height - view.bottom - 12 - 18 * (curves.length + soils.length);
+  let y = top + 12;
   const x = view.width - view.right - 10;
   const longest = Math.max(0, ...[...curves, ...soils].map(({ name }) => name.length));
-  const [left, below] = [x - 36 - 7 * longest, view.top + 6 + 18 * (curves.length + soils.length)];
-  if (longest) ink.area([left, view.top + 1, x + 6, view.top + 1, x + 6, below, left, below], color("paper"), 0.82); // readable over points
+  const [left, below] = [x - 36 - 7 * longest, top + 6 + 18 * (curves.length + soils.length)];
+  if (longest) ink.area([left, top + 1, x + 6, top + 1, x + 6, below, left, below], color("paper"), 0.82); // readable over points
   for (const curve of curves) {
     ink.text(curve.name, x - 28, y, color("ink"), "end");
     ink.line([x - 22, y, x, y], { color: color(curve.color), width: 2.4 });

@@ -66,7 +66,7 @@ export const page: Page = (main, { notices, query }) => {
     begin = Number(seek.value);
     feed.again();
   });
-  const past = h("input", { type: "range", id: "live-back", step: "any", "aria-label": "Look back while recording" });
+  const past = h("input", { type: "range", id: "live-back", step: "any", value: "100", disabled: true, "aria-label": "Look back while recording" });
   past.addEventListener("input", () => traces.lookBack(Number(past.value)));
   const follow = h("button", { type: "button", id: "follow", hidden: true, click: () => traces.lookBack(null) }, "Now");
   const place = h("output", { class: "hint" });
@@ -128,7 +128,7 @@ export const page: Page = (main, { notices, query }) => {
     const connected = feed.state === "connected";
     const isCurrent = connected && !isOld && !waiting;
     state.className = `state ${isCurrent ? "done" : feed.state === "lost" || (connected && isOld && traces.held === null) ? "failed" : ""}`;
-    state.textContent = { connecting: "connecting …", connected: isCurrent ? "connected" : waiting ? "connected, no rows yet" : traces.held !== null ? "paused" : "no measurements", lost: feed.hello ? `connection lost: ${why}` : why, ended: "the run has ended" }[feed.state];
+    state.textContent = { connecting: "connecting …", connected: isCurrent ? "connected" : waiting ? "connected, no rows yet: the service waits for its sources" : traces.held !== null ? "paused" : "no measurements", lost: feed.hello ? `connection lost: ${why}` : why, ended: "the run has ended" }[feed.state];
     main.classList.toggle("stale", isOld);
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;

@@ -1,5 +1,6 @@
 /** From a stranger's log to estimates, a curve and a report: columns, machine, estimate, and what follows from it. */
 
+import type { Run } from "../drive/run";
 import { get, send, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
@@ -42,6 +43,7 @@ export class LogPage {
   private looks = 0;
   private hasLabels = false;
   private estimates = "";
+  private hasAdhesion = true; // of the estimates
   private made = new Map<string, string>(); // by kind of job, what was made of the estimates
   readonly jobs: JobList;
 
@@ -77,7 +79,7 @@ export class LogPage {
     this.drawColumns(!this.profile && !this.look?.ready);
     this.drawMachine();
     this.drawEstimate();
-    this.drawNext();
+    await this.offerNext();
     await this.parts();
     await this.inspect();
   }
@@ -199,7 +201,7 @@ export class LogPage {
     go.disabled = true;
     const nothing = !this.profile && !this.look?.ready;
     if (nothing) {
-      fill(found, h("p", { class: "hint" }, "Not ready: choose the columns first."));
+      fill(found, h("p", { class: "hint" }, this.look ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
       return;
     }
     try {
@@ -244,6 +246,14 @@ export class LogPage {
     await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }));
   }
 
+  /** As `drawNext`, of the estimates as they are now. */
+  private async offerNext(): Promise<void> {
+    const path = this.estimates;
+    const about = path ? await tried(() => get<Run>("drive", { path })) : undefined;
+    this.hasAdhesion = about?.columns.some((name) => name.startsWith("adhesion_")) ?? true;
+    onceReleased(this.next, () => this.drawNext());
+  }
+
   /** What follows from the estimates; until there are any, what would. */
   private drawNext(): void {
     if (!this.estimates) {
@@ -265,9 +275,13 @@ export class LogPage {
     refill(this.next, [
       h("ul", { class: "next" },
         h("li", {}, h("a", { href: viewOf("estimates", this.estimates), id: "see-estimate" }, `See the drive: ${this.estimates}`)),
-        button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, freeName(this.items, `${stem}-soils`, ".json"))),
-        h("li", { class: "of" }, h("label", { for: soil.id }, "for the ground named"), soil),
-        button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, freeName(this.items, `${stem}-ground`, ".json"))),
+        ...(this.hasAdhesion
+          ? [
+              button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, freeName(this.items, `${stem}-soils`, ".json"))),
+              h("li", { class: "of" }, h("label", { for: soil.id }, "for the ground named"), soil),
+              button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, freeName(this.items, `${stem}-ground`, ".json"))),
+            ]
+          : [h("li", { class: "hint", id: "no-adhesion" }, "The log has no torque, so there is slip and no adhesion: no curve can be learned, and no change of the ground be found.")]),
         button("report", "Write the report", () => void this.queue("report", { ...runs, library, ground }, freeName(this.items, `${stem}-report`, ".html"))),
       ),
     ]);
@@ -287,7 +301,7 @@ export class LogPage {
   private async ended(job: Job): Promise<void> {
     await this.reload();
     if (!this.keep(job)) return;
-    onceReleased(this.next, () => this.drawNext());
+    await this.offerNext();
     const output = document.getElementById("wizard-output") as HTMLInputElement | null;
     if (output) output.value = freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet");
   }

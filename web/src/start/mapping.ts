@@ -260,10 +260,11 @@ function keyOf(proposal: Proposal): string {
 
 function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined): string {
   if (!choice) return "";
-  const range = column && column.minimum !== null ? `${digits(column.minimum)} to ${digits(column.maximum)}, median ${digits(column.median)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
+  const fine = digits(column?.minimum) === digits(column?.maximum) ? 7 : 3; // a field's longitudes differ from the fifth digit on
+  const range = column && column.minimum !== null ? `${digits(column.minimum, fine)} to ${digits(column.maximum, fine)}, median ${digits(column.median, fine)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
   if (!proposal) return `chosen by you; ${range}`;
   const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [proposal.give] : [])];
-  return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ")}. ${range}`;
+  return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ").replace(/\?$/, "")}. ${range}`;
 }
 
 /** How a column runs: the range of each stretch of the log, with zero as a line where it is crossed. */
