@@ -86,7 +86,7 @@ export function beyond(plot: uPlot, panel: Panel, found: Extent): void {
   ctx.textAlign = "right";
   const x = bbox.left + bbox.width - 4 * devicePixelRatio;
   ctx.fillText(above, x, bbox.top + 12 * devicePixelRatio);
-  ctx.fillText(below, x, bbox.top + bbox.height - 6 * devicePixelRatio);
+  ctx.fillText(below, x, bbox.top + bbox.height - 12 * devicePixelRatio);
   ctx.restore();
 }
 

@@ -39,7 +39,7 @@ export class EventList {
           "li",
           {},
           h("i", { class: `strip ${EVENT_COLORS[event.kind] ?? "ink"}`, "aria-hidden": "true" }),
-          h("button", { type: "button", class: "name", title: event.why, click: () => this.go(i) }, `${event.start.toFixed(1)} s  ${event.kind}, ${digits(event.end - event.start, 2)} s`),
+          h("button", { type: "button", class: "name", title: event.why, click: () => this.go(i) }, `${event.start.toFixed(1)} s  ${event.kind}${event.end > event.start ? `, ${digits(event.end - event.start, 2)} s` : ""}`),
         ),
       ),
     );

@@ -45,7 +45,7 @@ export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
       value: slips.length ? most : NaN,
       shown: [fixed(most, share), slips.length ? `${wheel}, ± ${fixed(spread, share)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
     },
-    grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : `µ ${digits(used, 2)}; the soil's maximum is not known yet`] },
+    grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : wheels.some((name) => ring.names.includes(`adhesion_${name}`)) ? `µ ${digits(used, 2)}; the soil's maximum is not known yet` : "needs a drive torque"] },
     speed: { value: v, shown: [fixed(v, pace), Number.isFinite(v) ? `± ${fixed(1.96 * ring.last("ground_speed_std"), pace)}` : "not known"] },
   };
 }

@@ -226,7 +226,7 @@ export const page: Page = (main, { notices, query }) => {
     updates = 0;
     drawPast();
     const drops = feed.age("status") < STATUS_AGE ? (health.dataset["drops"] ?? "") : "";
-    health.textContent = feed.state === "connected" && rate && !main.classList.contains("stale") ? [`${rate} updates/s`, drops].filter(Boolean).join(", ") : "";
+    health.textContent = feed.state === "connected" && rate && !main.classList.contains("stale") ? [`${rate} update${rate === 1 ? "" : "s"}/s`, drops].filter(Boolean).join(", ") : "";
   }, 1000);
   const watch = window.setInterval(() => {
     freshness();
@@ -276,16 +276,16 @@ function tracesOf(wheels: string[], columns: string[]): Trace[] {
       .map((wheel, i) => ({ column: `${name}_${wheel}`, color: WHEEL_COLORS[i % WHEEL_COLORS.length] ?? "blue", label: wheel }))
       .filter((line) => columns.includes(line.column));
   const one = (column: string, color: string): Trace["lines"] => (columns.includes(column) ? [{ column, color, label: column }] : []);
-  const trace = (title: string, kind: Kind | "–", lines: Trace["lines"], low: number, high: number): Trace => {
+  const trace = (title: string, kind: Kind | "–", lines: Trace["lines"], low: number, high: number, least: number): Trace => {
     const { name, scale } = unitNamed(kind);
-    return { title, unit: name, scale, lines, low: low * scale, high: high * scale };
+    return { title, unit: name, scale, lines, low: low * scale, high: high * scale, least: least * scale };
   };
   return [
-    trace("Slip", "share", each("slip"), -1.5, 2),
-    trace("Adhesion µ", "–", each("adhesion"), -0.5, 1.5),
-    trace("Ground speed", "speed", one("ground_speed", "blue"), 0, 20),
-    trace("Soil resistance ρs", "–", one("soil_resistance", "purple"), -0.3, 1),
-    trace("Efficiency η", "share", each("efficiency"), 0, 1),
-    trace("Online curve a", "–", one("curve_a", "green"), 0, 3),
-  ];
+    trace("Slip", "share", each("slip"), -1.5, 2, 0.1),
+    trace("Adhesion µ", "–", each("adhesion"), -0.5, 1.5, 0.1),
+    trace("Ground speed", "speed", one("ground_speed", "blue"), 0, 20, 0.2),
+    trace("Soil resistance ρs", "–", one("soil_resistance", "purple"), -0.3, 1, 0.05),
+    trace("Efficiency η", "share", each("efficiency"), 0, 1, 0.1),
+    trace("Online curve a", "–", one("curve_a", "green"), 0, 3, 0.1),
+  ].filter(({ lines }) => lines.length);
 }

@@ -15,6 +15,8 @@ export interface Trace {
   lines: { column: string; color: string; label: string }[];
   low: number;
   high: number;
+  /** What the axis spans at least: a standstill's noise is none of the driver's concern. */
+  least: number;
 }
 
 /** Pixels under which the charts stand below each other (as in the style sheet). */
@@ -268,7 +270,7 @@ export class Traces {
     low = Math.max(Math.min(low, trace.low === 0 ? 0 : low), trace.low);
     high = Math.min(high, trace.high);
     if (low > high) [low, high] = [Math.max(trace.low, 0), Math.min(trace.high, Math.max(trace.low, 0) + 1)]; // nothing is known
-    else if (low === high) [low, high] = trace.low === 0 ? [0, high + 1] : [low - 0.5, high + 0.5]; // it stands still
+    else if (high - low < trace.least) [low, high] = trace.low === 0 ? [low, low + trace.least] : [(low + high - trace.least) / 2, (low + high + trace.least) / 2];
     const room = 0.08 * (high - low);
     const before = this.ranges.get(trace.title);
     const now: [number, number] = [low - (trace.low === 0 ? 0 : room), high + room];
