@@ -8,7 +8,7 @@ from typing import Any
 LIVE = (
     "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "unreadable", "schema",
     "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned", "units",
-    "immobilization", "stuck", "push",
+    "contradiction", "immobilization", "stuck", "push",
 )  # fmt: skip
 """Of the live service; sinks get these too (terragrip.live.event)."""
 EVENTS = (

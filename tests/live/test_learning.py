@@ -172,3 +172,17 @@ def test_a_channel_that_never_comes_is_named(vehicle, long, lost, words):
     assert {out.estimate.event for out in outputs if isinstance(out, Row) and out.estimate.time > 3} == {
         "gap"
     }
+
+
+def test_torques_that_are_0_while_the_machine_pulls_are_an_event(vehicle, long):
+    """As 'terragrip inspect' names them; a right drive has no such event."""
+    recording = long.recording
+    _, events = played(core_of(vehicle, recording), recording)
+    assert [event for event in events if event.kind == "contradiction"] == []
+    torques = [name for name in recording.channels if name.startswith("drive_torque_")]
+    lost = recording.with_channels(**dict.fromkeys(torques, np.zeros(len(recording))))
+    _, events = played(core_of(vehicle, lost), lost)
+    (event,) = [event for event in events if event.kind == "contradiction"]
+    assert event.text.startswith(f"{torques[0]} (0) and ")
+    assert "never change while the vehicle drives" in event.text
+    assert event.time < 50

@@ -270,6 +270,8 @@ def test_a_channel_that_never_changes_beside_others_that_do(vehicle: Vehicle) ->
 
     assert notes() == []
     assert notes(*names) == []
+    torques = Recording(moving, {f"drive_torque_{w}": 0.0 * moving for w in WHEELS})
+    assert "drive_torque_rr (0) never change while the vehicle drives" in _dead_warnings(torques, vehicle)[0]
     assert notes(names[1]) == [
         "wheel_speed_fr (3.25) never changes while the vehicle drives: the sensor is dead, or the column is wrong."
     ]

@@ -10,7 +10,7 @@ import math
 from array import array
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.noise import sensor_of, settings_in
@@ -33,14 +33,14 @@ WORTH = 0.1
 class Learned:
     """SDs [SI] by channel and update periods [s], as learned from ``seconds`` of kept rows of the drive so far.
 
-    ``doubts``: sentences on speeds that are likely in another unit, once two evaluations in a row have found them. ``absent``: channels
-    without any value in the first rows, once.
+    ``doubts``: sentences on what the rows contradict, by the check of `terragrip.recording.plausibility`, once two evaluations in a row
+    have found it. ``absent``: channels without any value in the first rows, once.
     """
 
     noise: Mapping[str, float]
     held: Mapping[str, float]
     seconds: float
-    doubts: tuple[str, ...] = ()
+    doubts: Mapping[str, list[str]] = field(default_factory=dict)
     absent: tuple[str, ...] = ()
 
     def changes(self, estimator: TractionEstimator) -> list[str]:
@@ -79,7 +79,7 @@ class SettingsLearner:
         self._missing = (math.nan,) * len(channels)
         self._number = 0  # of the chunk that is open
         self._every = 1
-        self._doubtful = 0  # evaluations in a row that found a speed in another unit
+        self._doubtful: dict[str, int] = {}  # evaluations in a row that found something, by check
         self._open = array("d")  # rows one behind the other: time, then the channels
         self._began = math.nan
         self._rows = 0
@@ -128,7 +128,7 @@ class SettingsLearner:
         import numpy as np
 
         from terragrip.recording import Recording, held_periods
-        from terragrip.recording.plausibility import speed_warnings
+        from terragrip.recording.plausibility import warnings_by_check
 
         table = np.concatenate([np.frombuffer(rows) for rows in self._kept.values()])
         table = table.reshape(-1, 1 + len(self._channels))
@@ -138,10 +138,11 @@ class SettingsLearner:
         held = {**held_periods(log), **self._held}
         noise, _ = settings_in(log, self._vehicle, sensors=self._noise, held=held)
         seconds = sum(rows[-1 - len(self._channels)] - rows[0] for rows in self._kept.values())
-        doubts = speed_warnings(log, self._vehicle)
-        self._doubtful = self._doubtful + 1 if doubts else 0
+        found = warnings_by_check(log, self._vehicle)
+        self._doubtful = {name: self._doubtful.get(name, 0) + 1 for name in found}
+        doubts = {name: notes for name, notes in found.items() if self._doubtful[name] == 2}
         absent = tuple(name for name in self._channels if name not in known and self._number == 1)
-        return Learned(noise, held, seconds, tuple(doubts) if self._doubtful == 2 else (), absent)
+        return Learned(noise, held, seconds, doubts, absent)
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it, to the last bit; without what was given."""
@@ -158,7 +159,8 @@ class SettingsLearner:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from `state`, made by one of the same channels; raises ValueError or LookupError where it is none."""
         self._number, self._every, self._rows = state["number"], state["every"], state["rows"]
-        self._doubtful = state.get("doubtful", 0)
+        counts = state.get("doubtful")  # a number in records of 27 November 2026 and before
+        self._doubtful = dict(counts) if isinstance(counts, dict) else {}
         self._began = math.nan if state["began"] is None else state["began"]
         self._open = _numbers(state["open"])
         self._kept = {int(number): _numbers(text) for number, text in state["kept"].items()}

@@ -258,7 +258,9 @@ class Core:
         taken = estimator.converted if isinstance(estimator, EngineEstimator) else row.values
         learned = learner.add(row.time, taken)
         if learned is not None:
-            out += [Event(row.time, "units", "estimator", doubt) for doubt in learned.doubts]
+            for name, notes in learned.doubts.items():
+                kind = "units" if name == "rims" else "contradiction"
+                out += [Event(row.time, kind, "estimator", note) for note in notes]
             out += self._absent(row.time, learned.absent)
         changes = learned.changes(estimator) if learned is not None else []
         if learned is None or not changes:

@@ -370,7 +370,7 @@ def _offset_warnings(means: Means, forward: Floats, vehicle: Vehicle | None) -> 
 
 
 def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Wheels' channels with one value for the whole drive while other wheels' change."""
+    """Wheels' channels with one value for the whole drive while other wheels' change, and torques that are all 0."""
     notes = []
     for quantity, wheels in (("wheel_speed", vehicle.wheels), ("drive_torque", tuple(vehicle.driven_radii))):
         known = {f"{quantity}_{wheel}": recording.channels.get(f"{quantity}_{wheel}") for wheel in wheels}
@@ -378,7 +378,8 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
             name: v[np.isfinite(v)] for name, v in known.items() if v is not None and np.isfinite(v).any()
         }
         still = {name: float(v[0]) for name, v in held.items() if np.ptp(v) <= _ROUNDING * abs(v[0])}
-        if still and len(still) < len(held):
+        lost = quantity == "drive_torque" and not any(still.values())
+        if still and (len(still) < len(held) or lost):
             shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
             verb = "change" if len(still) > 1 else "changes"
             notes.append(

@@ -51,13 +51,13 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
     Without a vehicle that knows its wheels, checks that need their radii are left out.
     """
+    return [note for notes in warnings_by_check(recording, vehicle).values() for note in notes]
+
+
+def warnings_by_check(recording: Recording, vehicle: Vehicle | None) -> dict[str, list[str]]:
+    """Those sentences by the name of their check, of checks that found something."""
     log = _Log(recording, vehicle)
-    return [note for check in CHECKS for note in log.found(check.name)]
-
-
-def speed_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Of `unit_warnings` those of wheel speeds against the ground speed alone: some seconds of driving are enough."""
-    return rim_warnings(averaged(recording, _FINEST), vehicle) if vehicle.knows_wheels else []
+    return {check.name: notes for check in CHECKS if (notes := log.found(check.name))}
 
 
 class _Log:
