@@ -299,8 +299,8 @@ typedef struct { /* when the estimator warns of immobilization (see src/digging.
     tg_real warn;                   /* and of a score above this; on until it is half of this */
     tg_real most;                   /* points of a sign at most; of high slip and of the command twice as many */
     tg_real change;                 /* a point: rise of slip above its mean over a unit of time, or fall of the leading wheels' share of adhesion (-1 to 1) below its usual */
-    tg_real command;                /* a point off: gain of rim or ground speed over that mean, or twice as much loss of rim speed; log */
-    tg_real high_slip;              /* sure slip, which is slip less its SD, beyond which points are given, `most` at twice that */
+    tg_real command;                /* a point off: gain of rim speed over that mean, or twice as much loss; log */
+    tg_real high_slip;              /* slip beyond which points are given, `most` at twice that */
     tg_real resistance;             /* a point: rise of the soil resistance above its mean over a unit of time */
     tg_real stuck_duration;         /* s that the ground speed must stay below `stuck_travel` */
     tg_real stuck_travel, free_travel; /* ground over rim speed: below the first stuck, free again above the second */

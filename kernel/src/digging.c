@@ -4,7 +4,6 @@
  * score that warns. Only rows whose ground speed was measured count: between them slip follows from the model. */
 #include "estimator.h"
 
-#define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
 #define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
@@ -118,12 +117,12 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     const tg_real slip = now[TGI_SLIP], deviation = now[TGI_DEVIATION], sure = slip - deviation, rise = slip - mean[TGI_SLIP];
     const tg_real rim = now[TGI_RIM] - mean[TGI_RIM], gain = now[TGI_TRAVEL] - mean[TGI_TRAVEL];
     /* Rims that gain while the vehicle loses speed spin, by no command. They slow by command and in hits, yet also of a weak drive that
-     * digs in. Rims are known well where slip is not; what the vehicle gains has slip's SD, which is that of the speeds, relative. */
-    const tg_real rims = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command, command = tgi_max(rims, gain / one_point(s->command, deviation));
-    const tg_real high = s->high_slip > 0 ? sure / s->high_slip - 1 : 0;
+     * digs in. Rims are known well where slip is not. */
+    const tg_real command = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command;
+    const tg_real high = s->high_slip > 0 ? (slip - s->high_slip) / one_point(s->high_slip / s->most, deviation) : 0;
     const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];
     d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->change, deviation), -s->most, s->most);
-    d->points[TG_SIGN_HIGH] = bounded(s->most * high, 0, 2 * s->most);
+    d->points[TG_SIGN_HIGH] = bounded(high, 0, 2 * s->most);
     d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->change, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, now[TGI_RESISTANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_COMMAND] = -bounded(command, 0, 2 * s->most);

@@ -376,6 +376,7 @@ void tgi_reset_curves(tg_estimator *e);
 void tgi_curves(tg_estimator *e, int32_t learn, tg_real dt, tg_real distance, const tg_real *load, tg_real *o);
 
 /* digging.c */
+#define TG_SHORT ((tg_real)0.1) /* of the unit of time: rows within it are averaged, and the signals low-passed */
 tg_real tgi_pace(const tg_settings *s);
 void tgi_digging_rest(tgi_digging *d);
 int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row);

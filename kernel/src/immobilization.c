@@ -4,7 +4,7 @@
 
 #define TG_CALM ((tg_real)0.1)         /* s, low-pass of the rim speed by which a vehicle is called stuck */
 #define TG_HALF_TURN ((tg_real)3.14)   /* wheel radii: rims that went less since the vehicle stood are a start */
-#define TG_SURE 2                      /* SDs of the ground speed */
+#define TG_SURE 2                      /* SDs of the ground speed, of slip */
 #define TG_NEAREST ((tg_real)0.51)     /* of an interval: to the nearest sample, and where two are as near (5 Hz), to the earlier */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
 
@@ -33,15 +33,30 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
 }
 
 /* An SD without what the ground speed's delay makes of it, what the filter has not followed of it yet, and a `turn` that no sensor shows: the
- * first two grow as a vehicle digs in, and the warning is not to wait for that, nor to call a vehicle slow for it; a turn's sides cancel. */
-static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, tg_real speed)
+ * first two grow as a vehicle digs in, and the warning is not to wait for that, nor to call a vehicle slow for it; a turn's sides cancel.
+ * Relative to the larger speed, where a wheel slips against the travel, too: there slip itself changes less with the ground speed. */
+static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, tg_real speed, tg_real rim)
 {
-    return speed > 0 ? tgi_sqrt(tgi_max(tgi_square(deviation) - turn - (scene->late + scene->disputed) / tgi_square(speed), 0)) : deviation;
+    const tg_real relative = (tgi_square(deviation) - turn) * tgi_square(speed / rim);
+    return tgi_sqrt(tgi_max(relative - (scene->late + scene->disputed) / tgi_square(speed), 0));
+}
+
+/* Slip by the newest measured ground speed, of an estimate by torques: that believes forces, too, and is late where slip runs away. The
+ * sensor's noise, averaged over what the watch averages, is then at least the SD; a reading that is far off is no more than surely so. */
+static void see_newest(const tg_estimator *e, const tg_row *row, tgi_view *l)
+{
+    const tg_real rim = tgi_max(l->fastest, e->settings.standstill_speed), pace = TG_SHORT * e->constants.pace, interval = e->ground.interval;
+    const tg_real variance = (e->constants.variance[TG_GROUND_SPEED] + row->doubt[e->settings.machine.wheels]) / tgi_square(rim);
+    const tg_real most = TG_SURE * tgi_sqrt(tgi_square(l->deviation) + variance);
+    const tg_real beyond = (l->travel - (tg_real)e->direction * row->value[TG_GROUND_SPEED]) / rim;
+    l->slip += beyond < -most ? -most : beyond > most ? most : beyond;
+    if (l->slip > 1) l->slip = 1;
+    l->deviation = tgi_max(l->deviation, tgi_sqrt(variance * (interval < pace ? interval / pace : 1)));
 }
 
 /* What the powered wheels do (of none: all). Slip and fastest rim are the worst wheel's of each side, their mean: of a diagonal that spins
  * while the other holds they are the spinning one's, in a turn the sides cancel. */
-static tgi_view view_of(const tg_estimator *e, const tg_real *o)
+static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measured, const tg_real *o)
 {
     const tg_settings *s = &e->settings;
     tgi_view l;
@@ -53,7 +68,8 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
         const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], mu = o[TG_OUT_ADHESION + i];
-        const tg_real deviation = in_time(o[TG_OUT_SLIP_STD + i], &e->scene, e->scene.turn[i], tgi_max(tgi_fabs(rim), tgi_fabs(o[TG_OUT_GROUND_SPEED])));
+        const tg_real size = tgi_max(tgi_fabs(rim), s->standstill_speed), larger = tgi_max(size, tgi_fabs(o[TG_OUT_GROUND_SPEED]));
+        const tg_real deviation = in_time(o[TG_OUT_SLIP_STD + i], &e->scene, e->scene.turn[i], larger, size);
         if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], deviation, rim);
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], deviation, rim);
         l.rim += rim;
@@ -81,7 +97,8 @@ static tgi_view view_of(const tg_estimator *e, const tg_real *o)
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];
-    l.travel_deviation = in_time(o[TG_OUT_GROUND_SPEED_STD], &e->scene, 0, 1);
+    l.travel_deviation = in_time(o[TG_OUT_GROUND_SPEED_STD], &e->scene, 0, 1, 1);
+    if (measured && e->settings.method != TG_SPEEDS) see_newest(e, row, &l);
     if (l.slip < (tg_real)-0.2) l.slip = (tg_real)-0.2;
     return l;
 }
@@ -175,8 +192,8 @@ void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, i
     }
     if (!rests && moving && drive) judge_push(e, drive, o, dt);
     if (!rests && moving && slips) {
-        const tgi_view l = view_of(e, o);
         const int32_t measured = !row->reckoned && !isnan(row->value[TG_GROUND_SPEED]);
+        const tgi_view l = view_of(e, row, measured, o);
         if (measured) watch_stuck(e, row, &l);
         watch_digging(e, row, &l, measured);
     }

@@ -9,7 +9,7 @@ static tg_watch_settings default_watch(void)
     w.memory = (tg_real)0.35;
     w.usual = 96;
     w.soon = 6;
-    w.ahead = (tg_real)0.21;
+    w.ahead = (tg_real)0.18;
     w.beyond = 2;
     w.warn = (tg_real)3.6;
     w.most = 3;

@@ -42,12 +42,27 @@ def test_rising_slip() -> None:
     assert table["warning_rise"][-1] == pytest.approx(expected, rel=0.1)
 
 
-def test_high_slip_less_its_deviation() -> None:
+def test_high_slip() -> None:
     table = exactly(steady_rims(lambda t: 0.4 + 0 * t, 20.0, noise=0.0, pull_known=True))
-    expected = LIMITS["most"] * ((0.4 - table["slip_fl_std"][-1]) / LIMITS["high_slip"] - 1)
+    point = np.hypot(LIMITS["high_slip"] / LIMITS["most"], table["slip_fl_std"][-1])
+    expected = (0.4 - LIMITS["high_slip"]) / point
     assert table["warning_high_slip"][-1] == pytest.approx(expected, rel=0.05)
     points = sum(float(table[f"warning_{sign}"][-1]) for sign in SIGNS)
     assert table["warning"][-1] == pytest.approx(points, abs=0.01)  # what stays is its own low-pass
+
+
+def test_slip_is_by_the_newest_reading_of_a_slow_receiver_and_as_unsure_as_that() -> None:
+    """At 2 Hz with a stated SD of .1 m/s, rims at .6 m/s: the estimate follows half of what the reading leaps by."""
+    noise = 0.1
+    log = steady_rims(lambda t: 0.1 + 0 * t, 20.6, 20.0, noise=0.0, pull_known=True)
+    reading = np.where(log.time < 20.25, 0.54, 0.24)
+    reading[np.arange(len(reading)) % 10 != 0] = np.nan
+    table = estimate(
+        log.with_channels(ground_speed=reading), robot(), sensors={DELAY: 0.0, "ground_speed": noise}
+    )
+    expected = (0.6 - LIMITS["high_slip"]) / np.hypot(LIMITS["high_slip"] / LIMITS["most"], noise / 0.6)
+    assert table["warning_high_slip"][-1] == pytest.approx(expected, rel=0.1)
+    assert table["slip_fl"][-1] < 0.5
 
 
 def test_rising_resistance() -> None:
@@ -112,8 +127,8 @@ def test_leading_wheels_that_lose_adhesion_to_the_trailing_ones() -> None:
 def test_slip_that_rises_slowly_warns_once_it_will_surely_be_far_beyond_its_usual(work: float) -> None:
     """From the slip at which the machine works, in 8 s to .7 more: by the columns, the row in which that is so."""
     rises = later(20.0, 0.7 / 8)
-    table = exactly(steady_rims(lambda t: work + rises(t), 24.0, 20.0))
-    slip, deviation = table["slip_fl"], deviation_before(table, 20.0)
+    table = exactly(steady_rims(lambda t: work + rises(t), 24.0, 20.0, noise=0.01))
+    slip, deviation = work + rises(table.time), deviation_before(table, 20.0)
     rise = table["warning_rise"] * np.hypot(LIMITS["change"], deviation)
     least = np.maximum(LIMITS["ahead"], LIMITS["beyond"] * table["warning_usual_slip"])
     far = (slip - deviation + rise > least) & (table.time > 20)

@@ -75,7 +75,7 @@ def _immobilization(estimates: Estimates, rows: Ints) -> str:
     most = max(points.values())
     sentence = {
         "rise": f"slip of the worst wheels rose by {change['rise']:.0%} or more",
-        "high_slip": f"it is certainly above {limits['high_slip']:.0%}",
+        "high_slip": f"it is above {limits['high_slip']:.0%}",
         "leading": f"the leading wheels' adhesion against the trailing ones' fell by {change['leading']:.2f} or more below its usual",
         "resistance": f"soil resistance rose by {change['resistance']:.2f} or more",
     }
