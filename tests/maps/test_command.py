@@ -12,9 +12,7 @@ pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
 from lane_drives import drive, lanes
 from terragrip.cli import main
-from terragrip.maps.field_map import usual_cell
 from terragrip.maps.reading import read_map
-from terragrip.vehicle import Vehicle
 
 
 @pytest.fixture
@@ -30,7 +28,7 @@ def test_the_map_is_written_and_summed_up(
     import pyogrio
 
     out = tmp_path / "map.gpkg"
-    assert main(["map", str(estimates), "-o", str(out)]) == 0
+    assert main(["map", str(estimates), "-o", str(out), "--cell", "1"]) == 0
     assert [name for name, _ in pyogrio.list_layers(out)] == ["cells", "points", "anomalies"]
     assert pyogrio.read_info(out, layer="anomalies")["features"] == 0
     assert "difference_std" in pyogrio.read_info(out, layer="anomalies")["fields"]
@@ -87,23 +85,6 @@ def test_reading_a_map_leaves_nothing_beside_it(estimates: Path, tmp_path: Path)
     assert main(["map", str(estimates), "-o", str(out), "--quiet"]) == 0
     assert read_map(out).about.runs == ["drive"]
     assert sorted(tmp_path.iterdir()) == [estimates, out]
-
-
-def test_cells_are_as_large_as_the_machine_or_as_wide_as_it_works() -> None:
-    def cell(mass: float, **more: float) -> float:
-        axles = {"drive": {"mass": mass, "wheels": ["l", "r"]}}
-        tree = {"name": "m", "mass": mass, "axles": axles, "wheel": {"radius": 0.2, "inertia": 0.1}} | more
-        return usual_cell(Vehicle.from_dict(tree))
-
-    assert [cell(mass) for mass in (5.0, 60.0, 139.0, 1000.0, 6000.0, 12000.0)] == [
-        0.3,
-        0.7,
-        1.0,
-        2.0,
-        3.0,
-        5.0,
-    ]
-    assert [cell(mass, working_width=width) for mass, width in ((60.0, 0.5), (3000.0, 6.0))] == [0.5, 6.0]
 
 
 def test_two_days_of_one_file_name_are_told_apart(tmp_path: Path) -> None:

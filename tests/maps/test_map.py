@@ -114,7 +114,7 @@ def test_a_drive_mapped_twice_is_no_evidence_that_it_is_exact() -> None:
 
 
 def test_intervals_stay_where_no_pass_is_repeated_or_passes_differ_more_than_they_say() -> None:
-    once = map_of(repeated(0.02, 1))
+    once = map_of(repeated(0.02, 1), MapSettings(cell=1.0))
     assert not any("agree better" in note for note in once.notes)
     assert np.median(once.cells["adhesion"].std) > 0.01  # 0.02 over a few independent metres
     days = [
@@ -140,9 +140,33 @@ def test_patches_are_listed_and_borders_are_not() -> None:
     assert np.all(found.area.between(9, 60))
 
 
-@pytest.mark.parametrize(("rounded", "noise", "cell"), [(0.0, 0.0, 1.0), (0.9, 0.0, 1.5), (0.0, 0.4, 1.5)])
+@pytest.mark.parametrize(
+    ("mass", "lanes_apart", "width", "cell"),
+    [
+        (5.0, 3.0, None, 0.4),
+        (139.0, 8.0, None, 1.0),
+        (139.0, 2.9, None, 2.9),
+        (12000.0, 3.3, None, 3.3),
+        (12000.0, 2.0, None, 5.0),
+        (12000.0, 8.0, None, 8.0),
+        (60.0, 3.0, 0.5, 0.5),
+        (12000.0, 8.0, 6.0, 6.0),
+    ],
+)
+def test_cells_are_as_wide_as_the_machine_works_or_as_large_as_it_is(
+    mass: float, lanes_apart: float, width: float | None, cell: float
+) -> None:
+    """Its lanes show the width where nobody states it; cells narrower than lanes are stripes with nothing between them."""
+    one = drive(*lanes(6, 60, lanes_apart))
+    data = one.about["vehicle"] | {"mass": mass, "working_width": width}
+    data["axles"] = {name: axle | {"mass": mass / 2} for name, axle in data["axles"].items()}
+    one.about["vehicle"] = {key: value for key, value in data.items() if value is not None}
+    assert map_of([("a", one)]).cell == cell
+
+
+@pytest.mark.parametrize(("rounded", "noise", "cell"), [(0.0, 0.0, 1.0), (0.9, 0.0, 2.0), (0.0, 0.4, 2.0)])
 def test_cells_are_no_smaller_than_the_positions_are_good(rounded: float, noise: float, cell: float) -> None:
-    one, rng = drive(*lanes(6, 40, 3)), np.random.default_rng(1)
+    one, rng = drive(*lanes(6, 40, 5)), np.random.default_rng(1)
     for name in ("latitude", "longitude"):
         degree = np.radians(EARTH) * (1.0 if name == "latitude" else np.cos(np.radians(51.0)))
         moved = one[name] * degree + noise * rng.standard_normal(len(one))
@@ -169,9 +193,10 @@ def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
         return np.where(north > 14, 1.3, 1.0) * (1 + 0.01 * own) + 0.35 * firm
 
     made = map_of([("a", drive(*lanes(20, 60, 1), a=ground, noise=0.01))])
-    assert layer(made, "anomalies").query("quantity == 'adhesion' and kind == 'grips'").pipe(
-        local_east
-    ).round() == [30]
+    found = layer(made, "anomalies")
+    assert np.any(
+        np.abs(local_east(found[(found.quantity == "adhesion") & (found.kind == "grips")]) - 30) < 1
+    )
 
 
 def test_change_between_days_is_significant_where_it_is_one() -> None:

@@ -36,7 +36,7 @@ def command(
         float | None,
         typer.Option(
             metavar="METRES",
-            help="Size of a cell; default the working width, or by the mass: .2 to 5 m.",
+            help="Size of a cell; default the working width, or from lane to lane.",
         ),
     ] = None,
     slip: Annotated[

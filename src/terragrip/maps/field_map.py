@@ -14,6 +14,7 @@ from terragrip.maps.anomalies import Anomaly, anomalies_of
 from terragrip.maps.cells import CORRELATED, Cells, Pieces, cells_of, pieces_of
 from terragrip.maps.changes import Changes, changes_of
 from terragrip.maps.filling import filled
+from terragrip.maps.lanes import lane_spacing
 from terragrip.maps.places import Places, has_positions, places_of, zone_of
 from terragrip.maps.points import Points, points_of
 from terragrip.maps.repeats import WORTH_A_WORD, scaled, share_of_repeats
@@ -21,6 +22,7 @@ from terragrip.maps.soils import SoilWay, soil_of_cells, soil_way
 from terragrip.maps.values import QUANTITIES, readings_of, usual_slip
 
 if TYPE_CHECKING:
+    from terragrip.arrays import Floats
     from terragrip.estimation import Estimates
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
@@ -32,9 +34,9 @@ READ_BY_WHEELS = ("adhesion", "slip", "efficiency")
 MOST_CELLS = 50_000_000
 """Cells of the box around all runs beyond which a raster of them would not fit a common machine's memory."""
 METRE_MACHINE = 139.0
-"""kg of a machine with cells of 1 m, the paper's robot; those of others are as their length, the cube root of their mass ..."""
-CELLS = (0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
-"""... and in these sizes [m]."""
+"""kg of a machine with cells of 1 m, the paper's robot; those of others are as their length, the cube root of their mass."""
+NARROWEST = 0.6
+"""Of that size, about the machine's own width: nearer passes are over the same ground."""
 COARSE = 3.0
 """Times the scatter of the positions that a cell is at least: smaller ones show rounding and noise."""
 FARTHEST = 100_000.0
@@ -102,7 +104,8 @@ class MapMaker:
             )
         epsg = self._epsg or zone_of(estimates["latitude"], estimates["longitude"])
         places = places_of(estimates, epsg, self.settings.datum, file)
-        cell = self._cell or self.settings.cell or usual_cell(vehicle, places.scatter)
+        way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
+        cell = self._cell or self.settings.cell or usual_cell(vehicle, places, way)
         self._check_extent(places, cell, file or run)
         if not self.runs:
             self._begin(estimates, places, epsg, cell)
@@ -114,7 +117,6 @@ class MapMaker:
             self.notes.append(
                 f"{run}: the vehicle file has no antenna; it is assumed to be over the rear axle."
             )
-        way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))
         for reading in readings_of(estimates, places, self._slip, self.library):
             pieces = pieces_of(reading, estimates.time, way, self._cell, number, places.headland)
             self._parts.setdefault(reading.quantity, []).append(pieces)
@@ -199,13 +201,21 @@ class MapMaker:
         )  # fmt: skip
 
 
-def usual_cell(vehicle: Vehicle, scatter: float = 0.0) -> float:
-    """Size of a cell [m] if the user gives none: the working width, or by the machine's size where it is not stated; not less than
-    `COARSE` times the ``scatter`` [m] of the positions."""
-    by_mass = np.cbrt(vehicle.mass / METRE_MACHINE)
-    size = vehicle.working_width or min(CELLS, key=lambda size: abs(np.log(size / by_mass)))
-    least = next((size for size in CELLS if size >= COARSE * scatter), CELLS[-1])
-    return float(max(size, least))
+def usual_cell(vehicle: Vehicle, places: Places, way: Floats) -> float:
+    """Size of a cell [m] if the user gives none: the working width; where it is not stated, from lane to lane, and without
+    lanes by the machine's size. Not less than `COARSE` times the scatter of the positions. ``way`` [m] (n,) not decreasing."""
+    by_mass = _upward(float(np.cbrt(vehicle.mass / METRE_MACHINE)), 1)
+    spacing = lane_spacing(places, way, NARROWEST * by_mass)
+    size = vehicle.working_width or (_upward(spacing, 2) if spacing else by_mass)
+    return max(size, _upward(COARSE * places.scatter, 1))
+
+
+def _upward(size: float, digits: int) -> float:
+    """The next number up of so many digits: cells narrower than lanes leave stripes between them."""
+    if size <= 0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(size)) + 1 - digits)
+    return round(math.ceil(size / unit - 0.05) * unit, 9)
 
 
 def _enough(long: float, wide: float) -> float:

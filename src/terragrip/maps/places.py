@@ -250,14 +250,14 @@ def _headland(heading: Floats, way: Floats) -> Bools:
     bins = np.bincount((np.remainder(heading[known], np.pi) / np.pi * 36).astype(int) % 36, length[known], 36)
     ring = np.convolve(np.r_[bins[-1], bins, bins[0]], np.ones(3), mode="valid")
     centre = (int(ring.argmax()) + 0.5) * np.pi / 36
-    near = known & (np.abs(_axial(heading - centre)) < TURNED)
+    near = known & (np.abs(axial(heading - centre)) < TURNED)
     main = centre + 0.5 * np.angle(np.sum(length[near] * np.exp(2j * (heading[near] - centre))))
-    headland = known & (np.abs(_axial(heading - main)) > TURNED)
+    headland = known & (np.abs(axial(heading - main)) > TURNED)
     if length[headland].sum() > 0.5 * length[known].sum():
         return np.zeros(len(heading), dtype=bool)
     return np.asarray(headland)
 
 
-def _axial(angle: Floats) -> Floats:
+def axial(angle: Floats) -> Floats:
     """An angle of a line without direction, between -π/2 and π/2."""
     return np.asarray(np.remainder(angle + np.pi / 2, np.pi) - np.pi / 2)
