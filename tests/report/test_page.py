@@ -234,3 +234,15 @@ def test_what_has_nothing_to_show_stands_together_at_the_end_with_its_reason() -
 def test_the_wheels_of_a_machine_on_six_axles_can_be_told_apart() -> None:
     """The seventh wheel had the first one's colour and dash."""
     assert len({wheels.look(k) for k in range(12)}) == 12
+
+
+def test_the_zoom_looks_at_driving(drive: Drive) -> None:
+    """A log that mostly stands in its middle showed 40 s of a held value."""
+    run = drive(seconds=400.0)
+    estimates = run.estimates.copy()
+    estimates.loc[(run.time > 30) & (run.time < 330), [f"slip_{wheel}" for wheel in run.wheels]] = np.nan
+    quiet = Run(run.name, estimates, run.method)
+    whole, near, *_ = sections.tracking(quiet).content
+    assert "At standstill it is held." in whole.caption
+    start, end = map(int, re.findall(r"from (\d+) to (\d+) s", near.caption)[0])
+    assert quiet.moving[(quiet.time > start) & (quiet.time < end)].mean() > 0.4

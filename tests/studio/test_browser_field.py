@@ -159,7 +159,8 @@ def test_anomalies_are_listed_and_shown(page: Any, served: Served, folder: Path)
     first, degrees = frame.iloc[0], frame.to_crs(4326).iloc[0].geometry
     said = lines.first.inner_text()
     assert f"{first.area:g} m²" in said
-    assert f"{first.difference:.2f}"[:5] in said
+    assert f"{first.difference:.2f}"[:4] in said
+    assert f"± {1.96 * first.difference_std:.1g}"[:5] in said
     page.click("#anomalies button")
     centre = page.evaluate("() => window.terragripField.map.getCenter().toArray()")
     assert np.hypot(*(np.subtract(centre, [degrees.centroid.x, degrees.centroid.y]))) < 3e-5

@@ -262,6 +262,7 @@ def test_the_plot_shows_each_run_in_its_colour(page: Any, served: Served, three:
 def test_overlay_formulas_and_plot_have_no_faults_and_fit(
     browser: Any, served: Served, three: Path, theme: str, width: int
 ) -> None:
+    (three / f"{'Feldversuch_' * 6}3.parquet").write_bytes((three / "slow.parquet").read_bytes())
     context = browser.new_context(
         viewport={"width": width, "height": 800}, color_scheme=theme, bypass_csp=True
     )
@@ -279,6 +280,8 @@ def test_overlay_formulas_and_plot_have_no_faults_and_fit(
         page.click(f"{menu} summary")
         found = page.evaluate("async () => (await axe.run()).violations.map((v) => [v.id, v.nodes[0].html])")
         assert found == []
+        cut = page.locator(f"{menu} .menu").evaluate("e => e.scrollWidth - e.clientWidth")
+        assert cut <= 0  # long names ran out of the menu
         boxes.append(page.locator(f"{menu} .menu").bounding_box())
     wide = page.evaluate("() => document.documentElement.scrollWidth")
     context.close()

@@ -49,6 +49,7 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
             if run.soils
             else ""
         )
+        + " At standstill it is held." * (not run.moving.all())
         + (" Shaded: the vehicle is stuck." if run.stuck.any() else ""),
         f"Traction of wheel {wheel} over time in {run.name}: {sources}",
     )
@@ -258,13 +259,14 @@ def _sources(lane: Lane) -> str:
 
 
 def _zoom(run: Run) -> tuple[float, float, str]:
-    """The window to look into: around the first stuck spell, else around the middle of the run."""
+    """The window to look into: around the first stuck spell, else around the middle of the driving."""
     spells = stretches(run.outlier)
     if spells:
         first, last = spells[0]
         about = "the spell in which the vehicle is stuck"
         start, end = float(run.time[first]) - ZOOM_MARGIN, float(run.time[last]) + ZOOM_MARGIN
     else:
-        middle = float(run.time[len(run.time) // 2])
-        start, end, about = middle - ZOOM_MARGIN, middle + ZOOM_MARGIN, "the middle of the run"
+        rows = np.flatnonzero(run.moving)
+        middle = float(run.time[rows[len(rows) // 2] if len(rows) else len(run.time) // 2])
+        start, end, about = middle - ZOOM_MARGIN, middle + ZOOM_MARGIN, "the middle of the driving"
     return max(start, float(run.time[0])), min(end, float(run.time[-1])), about

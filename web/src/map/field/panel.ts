@@ -10,7 +10,11 @@ import { degrees, withStd } from "./reading";
 
 const LISTED = 200;
 const SEARCHED = ["adhesion", "soil_resistance"];
-const WORDS: Record<string, string> = { grips: "grips better", slips: "slips", soft: "soft", firm: "firm", high: "high", low: "low" };
+const WORDS: Record<string, string> = { grips: "grips better", slips: "grips less", soft: "soft", firm: "firm", high: "high", low: "low" };
+
+/** Of a map of slip alone, which tells nothing of grip: a turn without its tool slips less too. */
+const OF_SLIP: Record<string, string> = { grips: "slips less", slips: "slips more" };
+const HALF = 1.96; // standard deviations of half a 95 % interval
 
 /** The panel of one quantity; `go`: an anomaly was chosen; `job`: what made the file, where this studio did. */
 export function panelOf(field: Field, mapped: Mapped, found: Anomaly[], go: (anomaly: Anomaly) => void, job: Job | undefined): HTMLElement[] {
@@ -41,10 +45,10 @@ function anomalies({ name }: Mapped, found: Anomaly[], go: (anomaly: Anomaly) =>
     h(
       "li",
       {},
-      h("button", { type: "button", class: "link", "data-key": `anomaly ${i}`, click: () => go(one) }, `${i + 1}  ${WORDS[one.kind] ?? one.kind}: ${one.difference > 0 ? "+" : ""}${withStd(one.difference, one.difference_std, unit)}`),
+      h("button", { type: "button", class: "link", "data-key": `anomaly ${i}`, click: () => go(one) }, `${i + 1}  ${(name === "slip" ? OF_SLIP : WORDS)[one.kind] ?? one.kind}: ${one.difference > 0 ? "+" : ""}${withStd(one.difference, HALF * one.difference_std, unit)}`),
       h("span", { class: "hint" }, `${digits(one.area)} m² at ${degrees(one.place, 5)}, p\u00a0${one.p < 1e-4 ? "<\u00a00.0001" : digits(one.p, 2)}`),
     );
-  return h("section", { id: "anomalies" }, h("h2", {}, found.length ? `Anomalies (${found.length})` : "Anomalies"), found.length ? h("ol", { class: "anomalies" }, found.slice(0, LISTED).map(line)) : h("p", { class: "hint" }, none), found.length > LISTED ? h("p", { class: "hint" }, `The ${LISTED} strongest; all are in the file.`) : null);
+  return h("section", { id: "anomalies" }, h("h2", {}, found.length ? `Anomalies (${found.length})` : "Anomalies"), found.length ? h("p", { class: "hint" }, "By how much they differ from their surroundings, ± 95 %.") : null, found.length ? h("ol", { class: "anomalies" }, found.slice(0, LISTED).map(line)) : h("p", { class: "hint" }, none), found.length > LISTED ? h("p", { class: "hint" }, `The ${LISTED} strongest; all are in the file.`) : null);
 }
 
 function about(field: Field, job: Job | undefined): HTMLElement {
