@@ -71,7 +71,8 @@ export function limits({ values, bands }: Extent, panel: Panel): Range {
 /** What is said of values that lie outside the axis, above and below it; empty where there are none. */
 export function outsideOf({ all }: Extent, panel: Panel, [low, high]: Range): [string, string] {
   if (panel.log) return ["", ""];
-  return [all[1] > high ? `▲ up to ${digits(all[1])} ${panel.unit}` : "", all[0] < low ? `▼ down to ${digits(all[0])} ${panel.unit}` : ""];
+  const unit = panel.unit === "–" ? "" : ` ${panel.unit}`;
+  return [all[1] > high ? `▲ up to ${digits(all[1])}${unit}` : "", all[0] < low ? `▼ down to ${digits(all[0])}${unit}` : ""];
 }
 
 /** Shown in the chart's corners: values beyond the axis are never hidden without a sign. */
