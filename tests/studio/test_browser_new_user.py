@@ -233,6 +233,21 @@ def test_of_several_vehicles_none_is_taken_for_the_logs(
     assert page.is_enabled("#job-go")
 
 
+def test_what_a_long_log_waits_for_is_said(page: Any, served: Served, folder: Path, made: Path) -> None:
+    """Ten hours at 50 Hz: twenty seconds of four empty headings, then as many of a button that could not be pressed."""
+    for name in ("recording.parquet", "vehicle.yaml"):
+        (folder / name).write_bytes((made / name).read_bytes())
+    held: list[Any] = []
+    for name in ("columns", "inspect"):
+        page.route(f"**/api/{name}?*", lambda route: held.append(route))
+    page.goto(f"{served.url}/#/start?log=recording.parquet")
+    page.wait_for_selector("#step-columns ~ * >> text=Reading the log")
+    held.pop().continue_()
+    page.wait_for_selector("#wizard-found >> text=Trying an estimate")
+    held.pop().continue_()
+    page.wait_for_selector("text=ready to estimate")
+
+
 def test_a_click_on_save_counts_while_the_page_asks_the_server(
     page: Any, served: Served, folder: Path
 ) -> None:

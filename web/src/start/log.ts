@@ -75,6 +75,7 @@ export class LogPage {
     this.profile = first.includes(named) ? named : "";
     this.vehicle ||= this.onlyVehicle();
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
+    this.drawColumns(false); // that the log is read: a long one takes a while
     this.look = await this.mapping.open(freeName(this.items, `${stemOf(this.log)}-profile`, ".yaml"));
     this.drawColumns(!this.profile && !this.look?.ready);
     this.drawMachine();
@@ -204,6 +205,7 @@ export class LogPage {
       fill(found, h("p", { class: "hint" }, this.look ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
       return;
     }
+    fill(found, h("p", { class: "hint" }, this.vehicle ? "Trying an estimate …" : "Reading the log …"));
     try {
       const result = await get<Inspection>("inspect", { path: this.log, profile: this.profile || undefined, vehicle: this.vehicle || undefined, method });
       if (turn !== this.looks) return;
