@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,31 +16,25 @@ from terragrip.cli import main
 from terragrip.estimation import Estimates
 
 
-@pytest.fixture
-def files(tmp_path: Path) -> list[Path]:
-    """Two runs over grass and fine soil, and a library learned from two others."""
-    for seed, name in enumerate(("grass", "fine")):
-        drive(50 + seed, [(name, {"grass": GRASS, "fine": FINE}[name], 60)]).write(
-            tmp_path / f"{name}.parquet"
-        )
-    assert (
-        main(
-            [
-                "soils",
-                str(tmp_path / "grass.parquet"),
-                str(tmp_path / "fine.parquet"),
-                "-q",
-                "-o",
-                str(tmp_path / "soils.json"),
-            ]
-        )
-        == 0
-    )
-    paths = []
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with run1.parquet and run2.parquet, over grass and fine soil, and soils.json, learned from two others."""
+    folder = tmp_path_factory.mktemp("made")
+    alone = []
+    for seed, (name, ground) in enumerate({"grass": GRASS, "fine": FINE}.items()):
+        alone.append(str(folder / f"{name}.parquet"))
+        drive(50 + seed, [(name, ground, 60)]).write(alone[-1])
+    assert main(["soils", *alone, "-q", "-o", str(folder / "soils.json")]) == 0
     for seed in (1, 2):
-        paths.append(tmp_path / f"run{seed}.parquet")
-        drive(seed, [("grass", GRASS, 30), ("fine", FINE, 30)]).write(paths[-1])
-    return paths
+        drive(seed, [("grass", GRASS, 30), ("fine", FINE, 30)]).write(folder / f"run{seed}.parquet")
+    return folder
+
+
+@pytest.fixture
+def files(made: Path, tmp_path: Path) -> list[Path]:
+    """The two runs, copied with all beside them into the test's folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return [tmp_path / f"run{seed}.parquet" for seed in (1, 2)]
 
 
 def fails(capsys: pytest.CaptureFixture[str], output: Path, *words: Any) -> str:

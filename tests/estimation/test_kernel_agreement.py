@@ -137,7 +137,7 @@ def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
     case = problem(
         100 + wheels,
         wheels=wheels,
-        steps=60,
+        steps=40,
         condition=10 ** rng.uniform(6, 10),
         scale=10 ** rng.uniform(-2, 4),
         missing=0.15 * (wheels % 2),

@@ -144,15 +144,15 @@ def test_a_step_of_A_lowers_the_mismatch(factor):
 def test_A_finds_a_wrong_noise_of_a_random_walk(assumed):
     rng = np.random.default_rng(7)
     true_walk, r, dt = 0.5, 0.04, 0.1
-    x = np.cumsum(rng.normal(0, np.sqrt(true_walk * dt), 4000))
-    y = x + rng.normal(0, np.sqrt(r), 4000)
+    x = np.cumsum(rng.normal(0, np.sqrt(true_walk * dt), 2500))
+    y = x + rng.normal(0, np.sqrt(r), 2500)
     adaptive = AdaptiveFilter(
         KalmanFilter([[1.0]], [[1.0]], [[0.0]], [[r]], [0.0], [[1.0]]), [assumed * true_walk], 1, memory=10.0
     )
     result = []
     for k, value in enumerate(y):
         adaptive.step([value], dt=dt)
-        if k > 2000:
+        if k > 1000:
             result.append(assumed * adaptive.adaptation.scale[0])
     assert (
         0.6 < np.exp(np.mean(np.log(result))) < 1.6

@@ -47,35 +47,44 @@ def played(core: Core, recording):
     return columns, [out for out in outputs if isinstance(out, Event)]
 
 
-def test_it_ends_with_the_settings_of_the_file(vehicle, long):
-    wanted = tg.estimate(long.recording, vehicle).about["settings"]
+@pytest.fixture(scope="module")
+def learned(vehicle, long):
+    """The core after the minute, its estimates by column, not to be changed, and its events."""
     core = core_of(vehicle, long.recording)
-    _, events = played(core, long.recording)
+    return core, *played(core, long.recording)
+
+
+@pytest.fixture(scope="module")
+def guessed(vehicle, long):
+    """The estimates of one that learns nothing."""
+    return played(core_of(vehicle, long.recording, learn=False), long.recording)[0]
+
+
+def test_it_ends_with_the_settings_of_the_file(vehicle, long, learned):
+    wanted = tg.estimate(long.recording, vehicle).about["settings"]
+    core, _, events = learned
     assert core.estimator.held == pytest.approx(wanted["held"], rel=0.05)
     measured = [name for name in core.estimator.noise if name in long.recording.channels]
     assert len(measured) >= 10
     for name in measured:
         assert core.estimator.noise[name] == pytest.approx(wanted["noise"][name], rel=0.15), name
-    learned = [event for event in events if event.kind == "learned"]
-    assert 1 <= len(learned) <= 6
-    assert "noise of wheel_speed_fl" in learned[0].text
-    assert "ground_speed is held, one value in 0.2 s" in learned[0].text
+    said = [event for event in events if event.kind == "learned"]
+    assert 1 <= len(said) <= 6
+    assert "noise of wheel_speed_fl" in said[0].text
+    assert "ground_speed is held, one value in 0.2 s" in said[0].text
 
 
-def test_its_intervals_hold_and_the_guesses_do_not_fit(vehicle, long):
+def test_its_intervals_hold_and_the_guesses_do_not_fit(long, learned, guessed):
     late = long.recording.time > 30
-    guessed, _ = played(core_of(vehicle, long.recording, learn=False), long.recording)
     assert not 0.5 < fit_of(guessed, late) < 2.0
-    learned, _ = played(core_of(vehicle, long.recording), long.recording)
+    _, estimates, _ = learned
     for name in ("ground_speed", "slip_rl", "adhesion_rl"):
-        off = np.abs(learned[name] - long.truth[name])[late] / learned[f"{name}_std"][late]
+        off = np.abs(estimates[name] - long.truth[name])[late] / estimates[f"{name}_std"][late]
         assert np.mean(off < 1.96) > 0.9, name
 
 
-def test_its_innovations_are_as_large_as_expected(vehicle, long):
-    late = long.recording.time > 30
-    learned, _ = played(core_of(vehicle, long.recording), long.recording)
-    assert 0.7 < fit_of(learned, late) < 1.4
+def test_its_innovations_are_as_large_as_expected(long, learned):
+    assert 0.7 < fit_of(learned[1], long.recording.time > 30) < 1.4
 
 
 def fit_of(columns, rows) -> float:
@@ -83,16 +92,15 @@ def fit_of(columns, rows) -> float:
     return np.sum(columns["nis"][rows]) / np.sum(columns["channels"][rows])
 
 
-def test_it_is_causal_and_given_settings_are_not_touched(vehicle, long):
+def test_it_is_causal_and_given_settings_are_not_touched(vehicle, long, learned, guessed):
     """The rows up to the first event are those of the guesses; with the file's settings nothing is learned."""
-    learned, events = played(core_of(vehicle, long.recording), long.recording)
-    guessed, _ = played(core_of(vehicle, long.recording, learn=False), long.recording)
+    _, estimates, events = learned
     first = next(event.time for event in events if event.kind == "learned")
     before = long.recording.time <= first
     assert 900 < before.sum() < 1100
     for name, values in guessed.items():
-        assert np.array_equal(values[before], learned[name][before], equal_nan=True), name
-    assert not np.array_equal(guessed["adhesion_fl"][~before], learned["adhesion_fl"][~before])
+        assert np.array_equal(values[before], estimates[name][before], equal_nan=True), name
+    assert not np.array_equal(guessed["adhesion_fl"][~before], estimates["adhesion_fl"][~before])
 
     whole = tg.estimate(long.recording, vehicle)
     known = whole.about["settings"]
@@ -105,9 +113,8 @@ def test_it_is_causal_and_given_settings_are_not_touched(vehicle, long):
 
 
 @pytest.mark.parametrize("stops", [(950, 1003, 1800), (400, 2500, 4100)])
-def test_a_restart_changes_no_digit(vehicle, long, tmp_path, stops):
+def test_a_restart_changes_no_digit(vehicle, long, learned, tmp_path, stops):
     """Broken off and gone on, before and after what was learned; snapshots and write-ahead file both hold it."""
-    through, _ = played(core_of(vehicle, long.recording), long.recording)
     rows = list(rows_of(long.recording))
     begin = 0
     for stop in (*stops, len(rows)):
@@ -121,7 +128,7 @@ def test_a_restart_changes_no_digit(vehicle, long, tmp_path, stops):
     pipeline.flush()
     pipeline.close()
     _, estimates = read_record(tmp_path)
-    for name, values in through.items():
+    for name, values in learned[1].items():
         assert np.array_equal(values, estimates.columns[name], equal_nan=True), name
 
 
