@@ -10,7 +10,7 @@ import pytest
 
 from terragrip.vehicle import Vehicle
 
-sys.path.insert(0, str(Path(__file__).parent))  # steady_drive
+sys.path.insert(0, str(Path(__file__).parent))  # steady_drive, development_machine
 
 WHEELS = ("fl", "fr", "rl", "rr")
 Columns = dict[str, np.ndarray]

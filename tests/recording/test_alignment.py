@@ -10,13 +10,14 @@ import numpy as np
 import pandas.testing
 import pytest
 
+from development_machine import machine
 from terragrip.estimation import estimate
 from terragrip.estimation.noise import DELAY
 from terragrip.recording import Recording, alignment, survey
 from terragrip.recording.alignment import _Shift, aligned
 from terragrip.recording.lag import Lag, delay_of, lag_within
 from terragrip.recording.survey import LogBlocks, survey_of
-from terragrip.simulation import families, simulate
+from terragrip.simulation import simulate
 from terragrip.vehicle import Vehicle
 
 
@@ -30,8 +31,7 @@ def late(recording: Recording, seconds: float) -> Recording:
 
 @pytest.mark.parametrize("number", [14, 17])
 def test_slip_of_a_log_with_a_lag_is_that_of_the_log_without(number: int) -> None:
-    kind, seed = list(families.machines("development", 24))[number]
-    result = families.draw(kind, seed, rate=20.0)
+    result = machine(number)
     moving = np.abs(result.truth["true_ground_speed"].to_numpy()) > 0.05
 
     def judged(recording: Recording) -> tuple[float, float]:
@@ -92,8 +92,7 @@ def test_a_moved_channel_is_on_lines_or_held_within_its_samples_and_short_gaps(h
 
 
 def test_a_log_without_a_lag_stays_as_it_is() -> None:
-    kind, seed = list(families.machines("development", 24))[9]
-    log = families.draw(kind, seed, rate=20.0).recording
+    log = machine(9).recording
     (same,) = aligned([log])
     pandas.testing.assert_frame_equal(same.to_pandas(), log.to_pandas())
     assert same.notes == log.notes
@@ -159,8 +158,7 @@ def test_a_lag_is_searched_once_and_again_where_it_was_set_right(
 
 
 def test_a_delay_that_is_stated_counts_before_what_the_log_tells() -> None:
-    kind, seed = list(families.machines("development", 24))[9]
-    result = families.draw(kind, seed, rate=20.0)
+    result = machine(9)
     log, data = result.recording, result.vehicle.to_dict()
 
     def spread(**sensors: float) -> float:
@@ -171,7 +169,7 @@ def test_a_delay_that_is_stated_counts_before_what_the_log_tells() -> None:
 
 
 def test_slip_from_speeds_alone_counts_the_delay() -> None:
-    result = families.draw(*list(families.machines("development", 24))[9], rate=20.0)
+    result = machine(9)
     speeds = {n: v for n, v in result.recording.channels.items() if "torque" not in n}
     log = replace(result.recording, channels=speeds)
     sure, late = (estimate(log, result.vehicle, sensors={DELAY: s}) for s in (0.0, 0.3))

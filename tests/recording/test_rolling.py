@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from development_machine import machine
 from terragrip.recording import Recording, unit_warnings
 from terragrip.simulation import SimulationResult, families
 from terragrip.vehicle import Vehicle
-
-
-def machine(number: int, chassis: families.Chassis = "sprung") -> SimulationResult:
-    kind, seed = list(families.machines("development", 24, chassis=chassis))[number]
-    return families.draw(kind, seed, rate=20.0)
 
 
 def notes_on(result: SimulationResult, factor: float) -> list[str]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
+from development_machine import machine
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.turns import _uneven, exchange_warnings
 from terragrip.simulation import SimulationResult, families
@@ -15,12 +15,6 @@ from terragrip.vehicle import Vehicle
 
 TURNING, WORKING = 1, 7
 """Of the development machines: one that turns, of unlike axles, and one that works straight ahead."""
-
-
-@cache
-def machine(number: int) -> SimulationResult:
-    kind, seed = list(families.machines("development", 24))[number]
-    return families.draw(kind, seed, rate=20.0)
 
 
 def notes_on(
