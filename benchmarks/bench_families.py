@@ -178,6 +178,7 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
         estimated = np.full(truth.shape, np.nan)
         if view != "speeds alone":
             estimated = np.stack([estimates[f"adhesion_{w}"] for w in driven], axis=1)
+            outside &= np.isfinite(estimated).all(axis=1)  # not before anything was measured
         over = {name: held.score[name] / oracle[name] for name in SCORED}
         out.append(View(kind, seed, view, pooled_r2(truth, estimated, outside), held, over))
     return out
