@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -323,6 +324,22 @@ def test_data_do_not_fix_a_curve_that_explains_little_of_them(
     assert any("explains little of the bins" in note for note in result["notes"])
     output = capsys.readouterr().out
     assert f"no (R2 {result['r2']:.2f})" in output
+
+
+def test_what_a_log_contradicted_is_said_of_its_soils(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It stood in the estimates' summary alone, which nobody sees of a batch."""
+    note = "drive_torque_fl (0) never changes while the vehicle drives: the sensor is dead, or the column is wrong."
+    usual = "There is no drawbar_force: the vehicle is assumed to tow nothing."
+    paths = [tmp_path / f"run{k}.parquet" for k in range(7)]
+    for k, path in enumerate(paths):
+        replace(estimates(k), notes=(usual, note) if k else (usual,)).write(path)
+    learn(tmp_path / "soils.json", *paths)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines if note in line] == [f"run{k}" for k in range(1, 6)]
+    assert any("1 more run has such notes" in line for line in lines)
+    assert not any(usual in line for line in lines)
 
 
 def test_the_table_says_no_where_the_library_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

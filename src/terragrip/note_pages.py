@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 PAGES = (
     ("is a guess from the vehicle's size", "vehicle#noise-of-the-sensors"),
     ("a vehicle's own lag is", "formats#two-sources-of-one-drive"),
@@ -42,6 +44,9 @@ PAGES = (
     ("the vehicle pulls or climbs: no drive", "formats#what-the-motion-contradicts"),
     ("the wheels drive on as hard as before", "formats#what-the-motion-contradicts"),
     ("neither the motion nor another force answers", "formats#what-the-motion-contradicts"),
+    (": its scale changed, and", "formats#what-the-motion-contradicts"),
+    ("the zero of drawbar_force drifts", "formats#what-the-motion-contradicts"),
+    ("is by its name the torque of an axle", "vehicle#signals-that-are-missing"),
     ("pull, which no wheel that pulls does:", "formats#what-the-motion-contradicts"),
     ("its sign is wrong there, ", "formats#what-the-motion-contradicts"),
     ("while all other torques are not", "formats#what-the-motion-contradicts"),
@@ -91,8 +96,31 @@ PAGES = (
 )
 """Words of a note, and page#heading as in ``InputError(page=...)``."""
 
+_CONTRADICTED = ("formats#what-the-motion-contradicts", "formats#in-a-profile")
+_NO_FAULT = "Columns that are not used"
+_SHOWN = 5  # runs
+
 
 def with_page(note: str) -> str:
     """The note, and the page that explains it where there is one and the note does not name it itself."""
-    page = None if "(docs: " in note else next((page for words, page in PAGES if words in note), None)
+    page = None if "(docs: " in note else _page(note)
     return note if page is None else f"{note} (docs: {page})"
+
+
+def doubts_of(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
+    """Of runs, by name, with the notes of their estimates, what the log contradicted: for each of the first five its first such note, and
+    the number of the others. What is made of such estimates is as wrong as they are."""
+    found = [
+        f"{name}: {note}"
+        for name, notes in runs
+        for note in [one for one in notes if _page(one) in _CONTRADICTED and not one.startswith(_NO_FAULT)][
+            :1
+        ]
+    ]
+    more = len(found) - _SHOWN
+    words = f"{more} more run{'s have' if more > 1 else ' has'} such notes; 'terragrip report' shows them."
+    return found[:_SHOWN] + [words] * (more > 0)
+
+
+def _page(note: str) -> str | None:
+    return next((page for words, page in PAGES if words in note), None)

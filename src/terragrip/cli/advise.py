@@ -10,6 +10,7 @@ import typer
 from terragrip.cli.options import Quiet, VehicleFile
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
+from terragrip.note_pages import doubts_of, with_page
 
 
 def command(
@@ -55,6 +56,10 @@ def command(
     if target:
         write(advice, way, target)
     if not quiet:
+        for doubt in doubts_of(
+            (path.stem, table.notes) for path, table in zip(estimates, tables, strict=True)
+        ):
+            print(with_page(doubt))
         print(words(advice))
         if target:
             print(f"Written to {output}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
-from terragrip.note_pages import with_page
+from terragrip.note_pages import doubts_of, with_page
 
 if TYPE_CHECKING:
     from terragrip.maps import FieldMap
@@ -90,16 +91,23 @@ def command(
     files = distinct(inputs)
     names = run_names(files)
     sections = sections_by_run(ground, names) if ground else {}
-    runs = ((name, Estimates.read(path), str(path)) for name, path in zip(names, files, strict=True))
+    noted: list[tuple[str, tuple[str, ...]]] = []
+
+    def runs() -> Iterator[tuple[str, Estimates, str]]:
+        for name, path in zip(names, files, strict=True):
+            table = Estimates.read(path)
+            noted.append((name, table.notes))
+            yield name, table, str(path)
+
     steps = len(files) + 2
     with progress("map", quiet) as step:
         made = map_of(
-            runs, MapSettings(cell, slip, datum, fill), library, lambda done: step(done, steps), sections
+            runs(), MapSettings(cell, slip, datum, fill), library, lambda done: step(done, steps), sections
         )
         step(steps - 1, steps)
         write_map(made, target, layer)
     if not quiet:
-        print(summary(made))
+        print(*map(with_page, doubts_of(noted)), summary(made), sep="\n")
         print(f"Written to {output}")
 
 

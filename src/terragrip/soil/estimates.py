@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
+from terragrip.note_pages import doubts_of
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.blocks import Blocks, driven_wheels, estimates_blocks
 from terragrip.soil.fit import AdhesionCurve
@@ -76,6 +77,7 @@ class GatheredRuns:
     common_sd: float = 0.0
     slip_sd: float = 0.0
     wheels: int = 1
+    notes: list[tuple[str, ...]] = field(default_factory=list)
 
     def add(
         self,
@@ -94,6 +96,7 @@ class GatheredRuns:
             )
             raise InputError(problem, file=file or run, hint=hint)
         self.runs.append(run)
+        self.notes.append(estimates.notes)
         self.pairs += pairs_of(estimates, run, soil)
         for name, blocks in labelled_blocks(estimates, soil, file or run) if signatures else ():
             self.blocks.setdefault(name, []).append(blocks)
@@ -108,6 +111,7 @@ class GatheredRuns:
     def join(self, other: GatheredRuns) -> None:
         """Add all runs of `other`."""
         self.runs += other.runs
+        self.notes += other.notes
         self.pairs += other.pairs
         for name, blocks in other.blocks.items():
             self.blocks.setdefault(name, []).extend(blocks)
@@ -143,7 +147,8 @@ class GatheredRuns:
         plain = {name: learned.soil for name, learned in campaign.soils.items()}
         signed = with_signatures(plain, self.blocks, " and ".join(sorted(self.makers)))
         learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
-        return replace(campaign, soils=learned)
+        doubts = doubts_of(zip(self.runs, self.notes, strict=True))
+        return replace(campaign, soils=learned, words=(*doubts, *campaign.words))
 
 
 def zero_slip_sd(vehicle: Vehicle) -> float:
