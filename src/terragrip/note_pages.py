@@ -45,6 +45,7 @@ PAGES = (
     ("the wheels drive on as hard as before", "formats#what-the-motion-contradicts"),
     ("neither the motion nor another force answers", "formats#what-the-motion-contradicts"),
     (": its scale changed, and", "formats#what-the-motion-contradicts"),
+    ("in all rows, which no cell reads", "formats#what-the-motion-contradicts"),
     ("the zero of drawbar_force drifts", "formats#what-the-motion-contradicts"),
     ("is by its name the torque of an axle", "vehicle#signals-that-are-missing"),
     ("pull, which no wheel that pulls does:", "formats#what-the-motion-contradicts"),

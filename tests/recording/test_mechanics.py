@@ -226,6 +226,14 @@ def test_a_cell_of_the_vehicle_file_that_reads_0_throughout_is_named(stated: dic
     assert ("exactly 0 in all rows" in notes) is bool(notes) is bool(stated)
 
 
+def test_a_drawbar_force_of_one_value_is_named() -> None:
+    columns = drive()
+    notes = notes_on(
+        {**columns, "drawbar_force": np.full(len(columns["time"]), 40.0)}, machine(hitch_height=0.3)
+    )
+    assert "drawbar_force is 40 N in all rows, which no cell reads" in notes
+
+
 @pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])
 def test_an_accelerometer_that_is_tilted_is_named(bias: float, expected: str) -> None:
     columns = drive()

@@ -18,6 +18,7 @@ from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.schema import rim_names
+from terragrip.recording.stretches import is_one_value
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -337,10 +338,18 @@ def _pull_warnings(
 
 
 def _silent_cell(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A drawbar force of 0 in all rows, which no cell reads, though the vehicle file has one's noise, zero or gain."""
+    """A drawbar force of one value in all rows, which no cell reads; of 0 only where the vehicle file has one's noise, zero or gain."""
     pull, unsure = recording.channels.get("drawbar_force"), vehicle.uncertainty
     stated = (vehicle.sensors.drawbar_force, unsure.drawbar_gain, unsure.drawbar_offset)
-    if pull is None or np.nan_to_num(pull).any() or not (any(stated) or vehicle.calibration.drawbar_offset):
+    if pull is None or not is_one_value(pull):
+        return []
+    value = float(pull[np.isfinite(pull)][0])
+    if value:
+        return [
+            f"drawbar_force is {value:.4g} N in all rows, which no cell reads: what the tool pulls beyond that is taken for soil "
+            "resistance. Leave the column out, if nothing measured it."
+        ]
+    if not (any(stated) or vehicle.calibration.drawbar_offset):
         return []
     return [
         "drawbar_force is exactly 0 in all rows, which no cell reads, but the vehicle file has a cell's errors: if it was not connected, "
