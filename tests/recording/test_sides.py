@@ -219,3 +219,16 @@ def test_one_rim_that_is_apart_where_the_other_axle_is_level_is_named_without_a_
     (note,) = notes_on(bare, wheel_speed_fl=factor)
     assert note.startswith(f"Straight ahead the rim of fl goes {factor:.2f} times as fast as that of fr")
     assert not any("Straight ahead the rim" in one for one in notes_on(bare, wheel_speed_fl=1.07))
+
+
+def test_a_furrow_wheel_that_slips_while_the_axle_pulls_is_no_radius() -> None:
+    """A fifth of the drive is road, with hardly a pull; a scale is there, too."""
+    log = skidding(steered=True)
+    road, channels = log.time < 54, dict(log.channels)
+    channels |= {n: np.where(road, 0.2 * v, v) for n, v in channels.items() if n.startswith("drive_torque")}
+    rims = channels["wheel_speed_rr"]
+    furrow = replace(log, channels=channels | {"wheel_speed_rr": np.where(road, 1.0, 1.08) * rims})
+    said = "Straight ahead the rim of rl"
+    assert not any(said in note for note in side_warnings(furrow, vehicle(), log["angular_velocity_z"])[0])
+    scaled = replace(log, channels=channels | {"wheel_speed_rr": 1.08 * rims})
+    assert any(said in note for note in side_warnings(scaled, vehicle(), log["angular_velocity_z"])[0])

@@ -184,6 +184,13 @@ def _rolling(axle: Axle, straight: Bools, least: float) -> list[str]:
         low <= 0 or np.log(high / low) > _STEADY
     ):  # a wheel that spins, or an axle that stands: a scale is one number
         return []
+    if axle.pulls is not None:  # a furrow wheel slips less, but only where the axle pulls
+        light = straight & (np.abs(axle.pulls.sum(axis=0)) < _PULLING * axle.load)
+        rolls = (
+            np.quantile(axle.rims[0, light] / axle.rims[1, light], 0.5) if light.sum() >= _LEAST else ratio
+        )
+        if abs(np.log(max(rolls, 1e-9))) < least:
+            return []
     a, b = axle.wheels
     return [
         f"Straight ahead the rim of {a} goes {ratio:.2f} times as fast as that of {b}: check the scale of wheel_speed_{a} and "
