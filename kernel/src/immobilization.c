@@ -4,7 +4,7 @@
 
 #define TG_CALM ((tg_real)0.1)         /* s, low-pass of the rim speed by which a vehicle is called stuck */
 #define TG_HALF_TURN ((tg_real)3.14)   /* wheel radii: rims that went less since the vehicle stood are a start */
-#define TG_SURE 2                      /* SDs of the ground speed, of slip */
+#define TG_SURE 2                      /* SDs of the ground speed */
 #define TG_NEAREST ((tg_real)0.51)     /* of an interval: to the nearest sample, and where two are as near (5 Hz), to the earlier */
 #define TG_LONGEST_LOOK ((tg_real)1.5) /* s between two measured ground speeds: after more, being stuck is judged anew */
 
@@ -42,14 +42,14 @@ static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, 
 }
 
 /* Slip by the newest measured ground speed, of an estimate by torques: that believes forces, too, and is late where slip runs away. The
- * sensor's noise, averaged over what the watch averages, is then at least the SD; a reading that is far off is no more than surely so. */
+ * sensor's noise, averaged over what the watch averages, is then at least the SD. An outlier is no reading. */
 static void see_newest(const tg_estimator *e, const tg_row *row, tgi_view *l)
 {
     const tg_real rim = tgi_max(l->fastest, e->settings.standstill_speed), pace = TG_SHORT * e->constants.pace, interval = e->ground.interval;
     const tg_real variance = (e->constants.variance[TG_GROUND_SPEED] + row->doubt[e->settings.machine.wheels]) / tgi_square(rim);
-    const tg_real most = TG_SURE * tgi_sqrt(tgi_square(l->deviation) + variance);
     const tg_real beyond = (l->travel - (tg_real)e->direction * row->value[TG_GROUND_SPEED]) / rim;
-    l->slip += beyond < -most ? -most : beyond > most ? most : beyond;
+    if (tgi_weight(e->settings.tuning.huber, beyond, tgi_square(l->deviation) + variance) < 1) return;
+    l->slip += beyond;
     if (l->slip > 1) l->slip = 1;
     l->deviation = tgi_max(l->deviation, tgi_sqrt(variance * (interval < pace ? interval / pace : 1)));
 }
