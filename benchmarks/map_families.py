@@ -9,10 +9,11 @@ the working width, two in three the antenna. A map is made by default.
 
 The truth of a cell is the mean over 6 x 6 points of it: of adhesion the soil's curve at the map's slip (wheels sunk in as that slip
 makes them), of resistance that at the drive's median slip, times the ground's own variation. mapped: cells with an adhesion, of those
-with a resistance. held: cells whose 90 % interval holds the truth, and in brackets those of the worst machine. error: root mean
+with a resistance. held: cells whose 90 % interval holds the truth, mean of
+the machines, and in brackets that of the worst. error: root mean
 square over the truth's mean, median of the machines. real: listed anomalies whose cells are in truth beyond the medians of what is
-around on each side, in that direction and by half of what is listed or more. found: patches so by 15 % or more of the mean that an
-anomaly of their sign overlaps. --write puts the table into docs/maps.md.
+around on each side, in that direction and by half or more of what they are by the map's values.
+found: patches so by 15 % or more of the mean that an anomaly of their sign overlaps. --write puts the table into docs/maps.md.
 """
 
 from __future__ import annotations
@@ -197,7 +198,10 @@ def anomalies(made: FieldMap, ground: Ground, quantity: str, true: Floats) -> np
     cells, listed = made.cells[quantity], made.anomalies[quantity]
     place = np.column_stack([cells.column, cells.row]).astype(float)
     plot = ground.at(*((place + 0.5) * made.cell).T)[1]
-    apart = [beyond(place, one.cells, true) * np.sign(one.difference) / abs(one.difference) for one in listed]
+    real = 0
+    for one in listed:
+        said, holds = (np.sign(one.difference) * beyond(place, one.cells, x) for x in (cells.value, true))
+        real += bool(holds > 0 and holds >= 0.5 * said)
     patches, found = 0, 0
     for k in range(1, len(ground.drive.scenario.route.plots)):
         inside_ = np.flatnonzero(plot == k)
@@ -205,7 +209,7 @@ def anomalies(made: FieldMap, ground: Ground, quantity: str, true: Floats) -> np
         if abs(difference) > CLEAR * true.mean():
             patches += 1
             found += any(one.difference * difference > 0 and np.any(plot[one.cells] == k) for one in listed)
-    return np.array([len(listed), sum(one >= 0.5 for one in apart), patches, found])
+    return np.array([len(listed), real, patches, found])
 
 
 def beyond(place: Floats, cells: npt.NDArray[np.intp], true: Floats) -> float:
