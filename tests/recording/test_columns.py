@@ -128,6 +128,8 @@ def test_a_table_is_long_where_names_stand_beside_values() -> None:
     assert "columns='Signal name', values='value'" in (how_to_pivot(["t", "Signal name", "value"]) or "")
     for columns in (["t", "Signal name"], ["t", "value"], ["t", "speed"]):
         assert how_to_pivot(columns) is None
+    influx = [*("result", "table", "_start", "_stop", "_time", "_value", "_field", "_measurement", "host")]
+    assert "(index='_time', columns='_field', values='_value')" in (how_to_pivot(influx) or "")
 
 
 def test_an_index_named_time_is_the_time_and_no_other_is() -> None:

@@ -38,9 +38,9 @@ _OF_NAMES = (
         "tag",
     ),
     *(
+        "field",
         "measurement",
         "key",
-        "field",
         "name",
         "kanal",
         "kanalname",
@@ -112,9 +112,10 @@ def how_to_pivot(columns: Collection[str]) -> str | None:
     """What to do with a table that has the names of its signals in one column and all values in another; None of any other table."""
     bare = {re.sub(r"[^a-zà-ÿ]", "", name.lower()): name for name in columns}
     names, values = (next((bare[n] for n in known if n in bare), None) for known in (_OF_NAMES, _OF_VALUES))
-    if names is None or values is None or len(columns) > _NARROW:
+    influx = {"_field", "_value"} <= set(columns)  # and a column for each of its tags
+    if names is None or values is None or (len(columns) > _NARROW and not influx):
         return None
-    time = next((name for name in columns if name not in (names, values)), TIME)
+    time = "_time" if influx else next((name for name in columns if name not in (names, values)), TIME)
     return (
         f"make a column of each signal, in pandas: table.pivot_table(index={time!r}, columns={names!r}, values={values!r})"
         ".reset_index().to_csv('wide.csv', index=False)"
