@@ -128,6 +128,7 @@ def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
         ("0.20 m", "0,20 m", "wheel.20 m (line 10)", "unknown key", "write a decimal point ('0.20 m')"),
         ("0.20 m", "0 m", "wheel.radius (line 10)", "0 m is impossible", "at least 0.01 m"),
         ("0.30 m", "12 m", "center_of_gravity_height (line 5)", "12 m is impossible", "not exceed 5 m"),
+        ("slope: 0.5 deg", "tire_rolling_resistance: 30 %", "uncertainty.tire_rolling_resistance (line 14)", "0.3 is impossible", "not exceed 0.15"),
         ("slope: 0.5 deg", "slope: 5", "uncertainty.slope (line 14)", "5 rad is impossible", "write '5 deg'"),
         ("[fl, fr]", "[rl, fr]", "axles.front.wheels (line 8)", "the wheel rl occurs twice", "own name"),
         ("[fl, fr]", "[yes, no]", "axles.front.wheels (line 8)", "reads a wheel name as yes or no", "quotes"),

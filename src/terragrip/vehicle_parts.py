@@ -240,7 +240,9 @@ class Uncertainty(Part):
     drawbar_offset: _Force | None = None
     slope: _Angle | None = None
     wheel_radius: _Ratio | None = None
-    tire_rolling_resistance: _Ratio | None = None
+    tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.15)] | None = (
+        None  # of the load, as its key
+    )
     vertical_load: _Ratio | None = None
     mass: _Ratio | None = None
     hitch_load_gain: _Ratio | None = None
