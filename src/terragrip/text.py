@@ -27,6 +27,15 @@ _MAGIC = (
         "is a LabVIEW measurement file, whose header is no table's",
         "delete the lines above 'X_Value', write time for it, and delete 'Comment' at that line's end",
     ),
+    (b"ULog", "is a PX4 ULog", "make CSV tables of it by pyulog: ulog2csv LOG"),
+    *(
+        (
+            magic,
+            "is an ArduPilot log",
+            "make a CSV table by pymavlink: mavlogdump.py --format csv --types GPS,IMU,RPM LOG",
+        )
+        for magic in (b"FMT, 128, 89", b"\xa3\x95\x80\x80\x59FMT")
+    ),
     (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
 )
 

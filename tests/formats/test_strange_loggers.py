@@ -190,3 +190,13 @@ def test_labviews_files_are_refused_with_what_makes_a_table_of_them(tmp_path: Pa
     (tmp_path / "log.tdms").write_bytes(b"TDSm\x0e\0\0\0" + bytes(100))
     with pytest.raises(InputError, match="is a LabVIEW TDMS file; export it as CSV"):
         read(tmp_path / "log.tdms")
+
+
+def test_an_autopilots_log_is_refused_with_what_makes_a_table_of_it(tmp_path: Path) -> None:
+    """'row 5 has 4 cells, the header 6; give every row the same number of cells'."""
+    path = tmp_path / "rover.log"
+    path.write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nGPS, 1, 3, 48.1\n")
+    with pytest.raises(
+        InputError, match=r"is an ArduPilot log; make a CSV table by pymavlink: mavlogdump\.py"
+    ):
+        read(path)
