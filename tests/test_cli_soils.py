@@ -46,8 +46,8 @@ def estimates(
         "ground_speed": np.full(ROWS, 0.6),
     }
     a *= 1 + 0.03 * rng.standard_normal()
+    s = slip[0] + (slip[1] - slip[0]) * (0.5 - 0.5 * np.cos(columns["distance"] / 2))
     for wheel in ("fl", "fr", "rl", "rr"):
-        s = rng.uniform(*slip, ROWS)
         mu = CURVES["exponential"].value(s, {"a": a}) + 0.02 * rng.standard_normal(ROWS)
         columns |= {f"slip_{wheel}": s, f"slip_{wheel}_std": np.full(ROWS, 0.005), f"adhesion_{wheel}": mu}
     labels = {"soil": np.full(ROWS, soil, dtype=object)} if soil else {}

@@ -48,7 +48,7 @@ def estimates(seed: int, soils: tuple[str, ...], sensor: bool = False, rows: int
         },
     }
     for wheel in WHEELS:
-        slip = rng.uniform(0.0, 0.55, rows)
+        slip = 0.275 - 0.275 * np.cos(columns["distance"] / 2)
         mu = CURVES["exponential"].value(slip, {"a": 1.0}) * a
         for name, values, std in (
             ("slip", slip, 0.005),

@@ -43,7 +43,7 @@ def run_of(seed: int, rows: int = 400, **uncertainty: float) -> Estimates:
     """A run at 5 Hz and 1 m/s, clay and then loam, whose rear wheels follow a = .8 and .5."""
     draws, time = np.random.default_rng(seed), 0.2 * np.arange(rows)
     soil = np.where(np.arange(rows) < rows // 2, "clay", "loam").astype(object)
-    slip = draws.uniform(0.04, 0.5, rows)
+    slip = 0.27 + 0.23 * np.sin(time / 4 + draws.uniform(0, 6))
     columns = {
         "distance": time,
         "ground_speed": np.ones(rows),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -143,7 +145,7 @@ def test_only_a_curve_that_comes_down_by_a_twentieth_of_its_top_falls(loss, fall
     bins = bin_pairs(slip, mu, np.repeat([0, 1], slip.size // 2))
     verdict = compare_forms(bins)
     assert verdict.proposal is not None
-    assert _falls(bins, verdict) == falls
+    assert _falls(bins) == falls
 
 
 @pytest.mark.parametrize(("variation", "said"), [(0.0, False), (0.15, True)])
@@ -224,6 +226,18 @@ def test_a_machine_that_works_at_low_slip_gets_its_curve():
     assert learned.curve.bins_.settings.by == "pull"
     assert learned.soil.parameters["a"] == pytest.approx(0.9, rel=0.04)
     assert learned.curve.identifiability_.identifiable
+
+
+def test_wheels_that_hop_do_not_steepen_the_curve():
+    """Slip that swings by .05 within a tyre's answer, five times the stated noise: a was 13 % too high on an outsider's tractor."""
+    draws = np.random.default_rng(4)
+    pairs = [
+        replace(part, slip=part.slip + 0.05 * draws.standard_normal(part.slip.size), roll=0.4)
+        for part in light_work(top=0.2)
+    ]
+    curve = learn_soils(pairs).soils["field"].curve
+    assert curve.bins_.settings.by == "pull"
+    assert curve.parameters_["a"] == pytest.approx(0.9, rel=0.04)
 
 
 def test_without_any_slip_of_the_papers_range_there_is_a_curve_and_no_papers_fit_beside_it():

@@ -86,7 +86,9 @@ def _of_soil(
 ) -> Advice:
     known = soils.get(name) or (next(iter(soils.values())) if not name and len(soils) == 1 else None)
     drive = _drive(samples)
-    curves = of_library(known, samples, vehicle) if known else of_drives(samples, vehicle)
+    refuted = known is not None and known.fit.get("follows") is False
+    own = of_drives(samples, vehicle) if known is None or refuted else None
+    curves = of_library(known, samples, vehicle) if known is not None and own is None else own
     if curves is None:
         return Advice(
             name, drive=drive,
@@ -105,15 +107,17 @@ def _of_soil(
     best = best_of(over, over.efficiency)
     power = best_of(over, over.productivity)
     missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(samples, vehicle))
-    beyond = known is not None and power.slip > curves.reach
+    beyond = own is None and power.slip > curves.reach
     if beyond:
         missing.append(
             f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
             "form of the curve alone; learn it from drives with harder pulls"
         )
-    if soils and known is None:
+    if soils and own is not None:
         lacking = (
-            f"the library has no soil named {name!r}"
+            f"the library's {known.model} form cannot follow the drives that it was learned from"
+            if known is not None
+            else f"the library has no soil named {name!r}"
             if name
             else "the rows name no soil, and the library has several"
         )

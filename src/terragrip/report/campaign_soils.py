@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.soil.estimates import whole_length
+from terragrip.soil.estimates import roll_of, whole_length
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import Campaign, RunPairs, bin_parts, usable_pairs
 from terragrip.soil.library import Soil
@@ -27,7 +27,8 @@ def true_pairs(estimates: Estimates, result: SimulationResult, run: str) -> list
         columns[f"slip_{wheel}"] = result.truth[f"true_slip_{wheel}"].to_numpy()
         columns[f"slip_{wheel}_std"] = np.zeros(len(estimates))
         columns[f"adhesion_{wheel}"] = result.truth[f"true_adhesion_{wheel}"].to_numpy()
-    return usable_pairs(columns, estimates.wheels, whole_length(estimates.vehicle), run)
+    vehicle = estimates.vehicle
+    return usable_pairs(columns, estimates.wheels, whole_length(vehicle), run, roll_of(vehicle))
 
 
 def fits_of_truth(

@@ -85,11 +85,16 @@ def compare_forms(
     else:
         sentence = (
             f"The {asked} form cannot follow these data: {way}, its error is {mine.error:.3g} against {best.error:.3g} "
-            f"of the {best.form} form; use that one."
+            f"of the {best.form} form: {_how(best.form)}."
         )
     if len(compared) < len(names):
         sentence += f" {levels} slip bins cannot distinguish forms of more than {levels - 2} parameters."
     return FormVerdict(asked, tuple(scores), follows, None if follows else best.form, sentence)
+
+
+def _how(form: str) -> str:
+    model, intercept = FORMS[form]
+    return f"use --model {model}" if not intercept else f"in Python AdhesionCurve('{model}', intercept=True)"
 
 
 Split = tuple[Floats, Floats, Floats, Floats, Floats, Floats]

@@ -177,13 +177,19 @@ def pairs_of(estimates: Estimates, run: str, soil: str | None = None) -> list[Ru
     columns = {name: estimates[name] for name in estimates.names} | {"soil": _labels(estimates, soil)}
     driven = driven_wheels(estimates.vehicle)
     wheels = [w for w in estimates.wheels if w in driven] or list(estimates.wheels)
-    return usable_pairs(columns, wheels, whole_length(estimates.vehicle), run)
+    return usable_pairs(columns, wheels, whole_length(estimates.vehicle), run, roll_of(estimates.vehicle))
 
 
 def _labels(estimates: Estimates, soil: str | None) -> NDArray[np.object_]:
     if soil is not None:
         return np.full(len(estimates), soil, dtype=object)
     return estimates["soil"] if "soil" in estimates.names else np.full(len(estimates), "", dtype=object)
+
+
+def roll_of(vehicle: Vehicle) -> float:
+    """A driven wheel's diameter [m]: the way in which a tyre answers a change of slip is of its contact's length, or a few of them."""
+    radii = vehicle.driven_radii.values()
+    return 2 * sum(radii) / len(radii) if radii else 0.0
 
 
 def whole_length(vehicle: Vehicle) -> float:

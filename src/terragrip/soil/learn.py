@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 STRETCH = 10.0
 """Metres of one run that count as one draw of the bootstrap where there are too few runs."""
 FEW_RUNS = 5
+ALIKE = 0.25
+"""Share of the variance of slip's error that a row has in common with those beside it (half of its SD: `advice.curves.COMMON`)."""
 APART = 0.03
 """Relative difference of the scale by pull from that by slip beyond which it is reported."""
 FALL = 0.05
@@ -40,7 +42,8 @@ FALL = 0.05
 class RunPairs:
     """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the vehicle's pull, the mean
     adhesion of its wheels, at that instant (n,); the stretch of `STRETCH` metres of each pair, and the metres of the vehicle's path that
-    it represents, divided among a row's wheels (n,); rho_s and speed (rows,)."""
+    it represents, divided among a row's wheels (n,); rho_s and speed (rows,). ``roll``: metres that a wheel rolls until its adhesion has
+    followed its slip."""
 
     run: str
     soil: str
@@ -52,6 +55,27 @@ class RunPairs:
     metres: Floats
     resistance: Floats
     speed: Floats
+    roll: float = 0.0
+
+    @property
+    def steady(self) -> RunPairs:
+        """The pairs as means over `roll` metres of the path around each; slip's noise in them by rows of which `ALIKE` is common."""
+        rows = self.resistance.size
+        step = self.metres.reshape(-1, rows) * (self.metres.size / rows)
+        way = np.cumsum(step[0]) - step[0] / 2
+        first, last = (np.searchsorted(way, way + end) for end in (-self.roll / 2, self.roll / 2))
+        last = np.maximum(last, np.arange(rows) + 1)
+
+        def mean(values: Floats) -> Floats:
+            known = np.isfinite(values).reshape(-1, rows)
+            sums = np.cumsum([known * step, np.where(known, values.reshape(-1, rows), 0.0) * step], axis=-1)
+            sums = np.concatenate((np.zeros((*sums.shape[:2], 1)), sums), axis=-1)
+            way, total = sums[..., last] - sums[..., first]
+            return np.where(known & (way > 0), total / np.where(way > 0, way, 1.0), np.nan).ravel()
+
+        share = ALIKE + (1 - ALIKE) / np.tile(last - first, self.slip.size // rows)
+        slip, adhesion, pull = (mean(values) for values in (self.slip, self.adhesion, self.pull))
+        return replace(self, slip=slip, adhesion=adhesion, pull=pull, slip_std=self.slip_std * np.sqrt(share))
 
 
 @dataclass(frozen=True)
@@ -97,7 +121,7 @@ class Campaign:
 
 
 def usable_pairs(
-    columns: Mapping[str, Any], wheels: Sequence[str], length: float, run: str
+    columns: Mapping[str, Any], wheels: Sequence[str], length: float, run: str, roll: float = 0.0
 ) -> list[RunPairs]:
     """Pairs of one estimates table by soil: labelled, settled (vehicle and tool on one soil), no event.
 
@@ -129,6 +153,7 @@ def usable_pairs(
                 np.tile(steps[rows] / len(wheels), len(wheels)),
                 np.asarray(columns["soil_resistance"], dtype=float)[rows],
                 np.asarray(columns["ground_speed"], dtype=float)[rows],
+                roll,
             )
         )
     return out
@@ -204,10 +229,11 @@ def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
 
 def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
     """Bins of one soil's pairs, with the clusters that the bootstrap draws: runs, or stretches of runs where there are few."""
+    cluster = _clusters(parts)
+    parts = [part.steady for part in parts] if settings.by == BY_PULL else parts
     slip, adhesion, pull, metres, noise = (
         _joined(parts, name) for name in ("slip", "adhesion", "pull", "metres", "slip_std")
     )
-    cluster = _clusters(parts)
     if settings.by == BY_PULL:
         return bin_by_pull(slip, adhesion, pull, metres, cluster, settings, noise)
     return bin_pairs(slip, adhesion, cluster, settings)
@@ -240,10 +266,8 @@ def _learn(
     source: str,
 ) -> LearnedSoil:
     sorted_by_slip = bin_parts(parts, template.bins.papers())
-    verdict = _compared(sorted_by_slip)
-    curve, by_slip = _fits(parts, template, sorted_by_slip, verdict)
-    if curve.bins_.settings.by == BY_PULL:
-        verdict = _compared(curve.bins_)
+    curve, by_slip = _fits(parts, template, sorted_by_slip)
+    verdict = _compared(curve.bins_ if curve.bins_.settings.by == BY_PULL else sorted_by_slip, _form(curve))
     if curve.interval_ and len(parts) < FEW_RUNS:
         curve.notes_.append(
             f"The intervals come from stretches of {STRETCH:g} m of {len(parts)} run{'s' * (len(parts) > 1)}: "
@@ -254,6 +278,8 @@ def _learn(
         curve.doubt(moved_by_noise(corrected.moved))
     resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
+    if verdict is not None and not verdict.follows:
+        soil = replace(soil, fit={**soil.fit, "follows": False})
     if by_slip is not curve:
         papers = by_slip.to_dict()
         kept = ("parameters", "interval", "r2", "nrmse", "bins", "settings", "band")
@@ -272,14 +298,17 @@ def _learn(
 
 
 def _fits(
-    parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins, verdict: FormVerdict | None
+    parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins
 ) -> tuple[AdhesionCurve, AdhesionCurve]:
-    """The fit that counts and the paper's by slip, which may be one; ``verdict`` is on the forms for the bins by slip.
+    """The fit that counts and the paper's by slip, which may be one.
 
     Raises InputError with too few slips, or no fit.
     """
     why = "the curve falls within the bins, so that one pull has two slips"
-    if template.bins.by == BY_PULL and not _falls(sorted_by_slip, verdict):
+    steady = [part.steady for part in parts]
+    if template.bins.by == BY_PULL and not (
+        _falls(sorted_by_slip) and _falls(bin_parts(steady, sorted_by_slip.settings))
+    ):
         try:
             curve = explaining(template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins))))
         except InputError as error:
@@ -312,16 +341,26 @@ def _of_noise(parts: Sequence[RunPairs], curve: AdhesionCurve) -> SlipNoise:
     return shifted(curve, freed, {name: plain[name] for name in free}, slip, noise, "the fit is freed of it")
 
 
-def _compared(bins: Bins) -> FormVerdict | None:
-    """The verdict on the paper's form; None where the bins cannot decide."""
+def _form(curve: AdhesionCurve) -> str:
+    """The form that a curve was fitted with, as `FORMS` names it; the paper's with all parameters free is the effective one."""
+    model = "effective" if curve.model == "exponential" and len(curve.free_) > 1 else curve.model
+    return f"{model} with intercept" if curve.intercept else model
+
+
+def _compared(bins: Bins, asked: str = "exponential") -> FormVerdict | None:
+    """The verdict on a form; None where the bins cannot decide, or the form is none of those compared."""
     try:
-        return compare_forms(bins)
+        return compare_forms(bins, asked)
     except InputError:
         return None
 
 
-def _falls(bins: Bins, verdict: FormVerdict | None) -> bool:
-    """Whether adhesion falls by more than FALL of its maximum within the bins: by the best form, where the paper's cannot follow them."""
+def _falls(bins: Bins) -> bool:
+    """Whether adhesion falls by more than FALL of its maximum within the bins: by the best form, where the paper's cannot follow them.
+
+    Noise of slip, or wheels that hop, make slips that no pull asked for, and bins by slip fall there; not those of steady ones.
+    """
+    verdict = _compared(bins)
     if verdict is None or verdict.proposal is None:
         return False
     model, intercept = FORMS[verdict.proposal]
