@@ -205,12 +205,15 @@ def borders(result: SimulationResult) -> Iterator[tuple[float, float, float, boo
 
 
 def match(
-    some: Sequence[Change], spans: Sequence[tuple[float, float, float, bool]], seconds: float
+    some: Sequence[Change],
+    spans: Sequence[tuple[float, float, float, bool]],
+    seconds: float,
+    margin: float = MARGIN,
 ) -> Matches:
-    """One change a border; a border between fine and wet may be determined or not."""
+    """One change a border, within `margin` [s] of its transition; a border between fine and wet may be determined or not."""
     out, matched = Matches(borders=sum(differ for *_, differ in spans), hours=seconds / 3600), set()
     for change in some:
-        near = [k for k, (a, b, _, _) in enumerate(spans) if a - MARGIN <= change.time <= b + MARGIN]
+        near = [k for k, (a, b, _, _) in enumerate(spans) if a - margin <= change.time <= b + margin]
         free = [k for k in near if k not in matched]
         if free and not spans[free[0]][3]:
             matched.add(free[0])

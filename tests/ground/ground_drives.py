@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -87,3 +87,14 @@ def drive(
         }
     made = {"method": "bank", "smooth": False, "vehicle": Vehicle.from_dict(VEHICLE).to_dict(), **about}
     return Estimates(time, columns, np.zeros(n, dtype=np.uint8), {"soil": label}, made)
+
+
+def thinned(estimates: Estimates, every: int) -> Estimates:
+    """Each `every`-th row: the same drive by a slower logger."""
+    return replace(
+        estimates,
+        time=estimates.time[::every],
+        columns={name: values[::every] for name, values in estimates.columns.items()},
+        event_codes=estimates.event_codes[::every],
+        labels={name: values[::every] for name, values in estimates.labels.items()},
+    )

@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from ground_drives import COARSE, FINE, GRASS, drive
+from ground_drives import COARSE, FINE, GRASS, Ground, drive, thinned
 from terragrip.errors import InputError
-from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of, weights
+from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of
 from terragrip.ground.conjugate import Model
+from terragrip.ground.noise import noise_of, usual_noise
 from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
 from terragrip.ground.signals import GROUND, curve_scale, signals_of
+from terragrip.ground.steps import A_LENGTH, joined, steps_of
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
 
@@ -57,9 +59,7 @@ def test_the_segmentation_is_the_best_of_all(seed):
         ends = np.array([0, *cuts, 24])
         return cost.of(ends[:-1], ends[1:]).sum() + price * len(cuts)
 
-    every = [
-        c for k in range(6) for c in combinations(range(0, 24, 2), k) if (np.diff([0, *c, 24]) >= LEAST).all()
-    ]
+    every = [c for k in range(6) for c in combinations(range(24), k) if (np.diff([0, *c, 24]) >= LEAST).all()]
     assert tuple(_pelt(cost, price)) == min(every, key=total)
 
 
@@ -82,16 +82,18 @@ def test_pull_alone_is_no_change():
         assert changes_of(blocks, ("slip", "adhesion"))
 
 
-def test_correlation_lowers_what_a_block_counts_for():
-    """First-order noise: weights near (1 - r)/(1 + r), white noise near 1; steps of the level do not pass for correlation."""
+def test_noise_is_the_estimates_own_and_the_grounds():
+    """White noise counts whole, what outlasts a step by half, up to what is usual; steps of the level pass for neither."""
     rng = np.random.default_rng(0)
-    white = rng.standard_normal(4000)
-    red = np.zeros(4000)
-    for k in range(1, 4000):
-        red[k] = 0.7 * red[k - 1] + np.sqrt(1 - 0.49) * white[k]
-    assert weights(white) == pytest.approx(1, abs=0.1)
-    assert weights(red) == pytest.approx(0.3 / 1.7, rel=0.35)
-    assert weights(white + 8 * (np.arange(4000) // 400 % 2)) == pytest.approx(1, abs=0.1)
+    white = rng.standard_normal(8000)
+    ground = np.repeat(rng.standard_normal(4000), 2)
+    slow = np.repeat(rng.standard_normal(1000), 8)
+    levels = 8 * (np.arange(8000) // 400 % 2)
+    signals = 0.03 * np.column_stack([white, white + levels, white + ground, white + 9 * slow])
+    within, weight = noise_of(signals, ("slip",) * 4)
+    floor = np.sqrt(1 + 0.25)  # half of what is usual: no ground is quite even
+    np.testing.assert_allclose(within / 0.03, [floor, floor, np.sqrt(2), np.sqrt(2)], rtol=0.1)
+    np.testing.assert_allclose(weight, [1.25 / 1.5, 1.25 / 1.5, 2 / 3, 2 / 3], rtol=0.1)
 
 
 def test_standing_still_changes_nothing():
@@ -122,8 +124,11 @@ def test_the_detector_is_the_plain_recursion(monkeypatch):
     blocks = blocks[blocks.known]
     x, model = signals_of(blocks), replace(Model.of(GROUND), weight=np.ones(4))
     monkeypatch.setattr("terragrip.ground.online_changes._LEAST", 0.0)
+    monkeypatch.setattr(
+        "terragrip.ground.online_changes.noise_of",
+        lambda _, names: usual_noise(names)._replace(weight=np.ones(4)),
+    )
     detector = OnlineChanges(OnlineSettings(length=30))
-    detector._weight = model.weight
     detector.update(blocks)
     hazard = -np.expm1(-0.3 / 30)  # 0.3 m a block
     expected = plain_probabilities(x, hazard, model)
@@ -152,17 +157,55 @@ def test_block_by_block_and_with_a_break_it_tells_the_same():
 
 
 def test_slow_roughness_lets_levels_speak():
-    """At 4 Hz a half second has two rows: no roughness, but a change of level is still found."""
+    """At 4 Hz a half second has two rows: no roughness, but a change of level is still found; at 1 Hz too."""
     estimates = drive(6, [("grass", GRASS, 40), ("fine", FINE, 40)])
-    thin = replace(
-        estimates,
-        time=estimates.time[::5],
-        columns={k: v[::5] for k, v in estimates.columns.items()},
-        event_codes=estimates.event_codes[::5],
-        labels={k: v[::5] for k, v in estimates.labels.items()},
-    )
-    result = changes_of(estimates_blocks(thin))
-    assert [round(c.time) for c in result] == [40]
+    for every in (5, 20):
+        result = changes_of(estimates_blocks(thinned(estimates, every)))
+        assert [change.time for change in result] == pytest.approx([40], abs=1.5)
+
+
+@pytest.mark.parametrize("scale", [1, 4])
+def test_hard_grounds_that_come_and_go_are_told_apart(scale):
+    """rho_s .045 and .1 for five vehicle lengths each, crossed within one: by a robot and, in four times the time, a tractor."""
+    hard, soft = Ground(0.7, 0.045, 0.004), Ground(0.7, 0.1, 0.009)
+    parts = []
+    for k in range(6):
+        one, other = (hard, soft) if k % 2 == 0 else (soft, hard)
+        ramp = [
+            replace(one, resistance=w * other.resistance + (1 - w) * one.resistance)
+            for w in (0.2, 0.4, 0.6, 0.8)
+        ]
+        parts += [("one", one, 22 * scale), *(("border", part, scale) for part in ramp)]
+    estimates = drive(8, [*parts, ("one", hard, 14 * scale)], speed=0.5)
+    length = 2.7 * scale
+    blocks = estimates_blocks(estimates)
+    borders = scale * (24 + 26 * np.arange(6))
+    result = changes_of(blocks, step=length / A_LENGTH)
+    assert [change.time for change in result] == pytest.approx(borders, abs=2 * scale)
+    live = OnlineChanges(OnlineSettings(step=length / A_LENGTH)).update(blocks)
+    assert 4 <= len(live) <= 6
+    assert all(np.abs(borders - change.time).min() < 3 * scale for change in live)
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=6), st.floats(0.0, 3.0))
+@settings(max_examples=20)
+def test_steps_are_means_of_their_blocks_however_they_come(cuts, length):
+    blocks = estimates_blocks(drive(9, [("fine", FINE, 12), ("grass", GRASS, 8)]))
+    whole, rest, _ = steps_of(blocks, length)
+    known = blocks[blocks.known]
+    shown = known[: len(known) - len(rest)]
+    assert whole.usable.sum() == shown.usable.sum()
+    counts = np.searchsorted(shown.travelled, whole.travelled, side="right")
+    firsts = np.concatenate(([0], counts[:-1]))
+    means = [shown.resistance[a:b].mean() for a, b in zip(firsts, counts, strict=True)]
+    np.testing.assert_allclose(whole.resistance, means, rtol=1e-12)
+    assert (np.diff(whole.travelled) >= 0.999 * length).all()
+    begin, pending, pieces = None, blocks[:0], blocks[:0]
+    for part in np.split(np.arange(len(blocks)), np.minimum(np.cumsum(cuts), len(blocks))):
+        some, pending, begin = steps_of(joined(pending, blocks[part]), length, begin)
+        pieces = joined(pieces, some)
+    np.testing.assert_array_equal(pieces.resistance, whole.resistance)
+    np.testing.assert_array_equal(pieces.start, whole.start)
 
 
 def test_short_and_empty_drives_have_none():

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ground_drives import COARSE, FINE, GRASS, Ground, drive
+from ground_drives import COARSE, FINE, GRASS, RATE, Ground, drive, thinned
+from ground_library import learned
 from terragrip.errors import InputError
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.emissions import Emissions
@@ -16,6 +17,7 @@ from terragrip.ground.unknown import CELLS
 from terragrip.soil.blocks import estimates_blocks
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import literature_soils
+from terragrip.soil.signature import signature_in
 
 MIXED = [("grass", GRASS, 30), ("fine", FINE, 30), ("coarse", COARSE, 30), ("grass", GRASS, 20)]
 
@@ -162,3 +164,27 @@ def test_nothing_to_read_is_said(library):
     assert "No stretch of the drive shows the ground" in ground.notes[0]
     assert ground.sections[0].slip_mean is None
     assert [e.kind for e in ground.events] == ["standstill"]
+
+
+@pytest.mark.parametrize("hertz", [1, 4])
+def test_slow_logs_teach_and_name_soils_by_level(hertz):
+    """Under 8 Hz no signature was learned, and at 1 Hz no block showed the ground at all."""
+    every = int(RATE) // hertz
+    pieces = [("grass", GRASS, 60), ("fine", FINE, 60)]
+    library = learned([thinned(drive(seed, pieces), every) for seed in (1, 2)])
+    assert all(signature_in(soil).roughness is None for soil in library.values())
+    ground, _ = analyse(thinned(drive(3, pieces), every), library)
+    assert [section.soil for section in ground.sections] == ["grass", "fine"]
+    assert min(max(section.probabilities.values()) for section in ground.sections) > 0.9
+
+
+def test_slip_that_is_not_known_leaves_the_soil_to_the_resistance(library):
+    """Slip +- .3: a curve's error is at most its height; by its slope alone every known soil was thought impossible."""
+    blind = drive(4, [("grass", GRASS, 60)])
+    wide = {
+        name: np.full_like(x, 0.3)
+        for name, x in blind.columns.items()
+        if name.startswith("slip_") and name.endswith("_std")
+    }
+    ground, _ = analyse(replace(blind, columns={**blind.columns, **wide}), library)
+    assert [section.soil for section in ground.sections] == ["grass"]

@@ -106,20 +106,21 @@ def test_blocks_count_from_an_origin_and_go_on_from_the_block_before() -> None:
     blocks = blocks_of(data, AXLES, origin=3.0, before=(3, 7))
     assert blocks.number.tolist() == list(range(4, 14))
     assert blocks.streak.tolist() == list(range(8, 18))
-    assert blocks_of(data, AXLES, origin=3.0, before=(2, 7)).streak[0] == 1
+    assert blocks_of(data, AXLES, origin=3.0, before=(0, 7)).streak[0] == 8
+    assert blocks_of(data, AXLES, origin=3.0, before=(-1, 7)).streak[0] == 1
     assert blocks[2:4].number.tolist() == [6, 7]
     late = {n: v[25:] if len(v) else v for n, v in data.items()}
     assert blocks_of(late, AXLES, origin=5.0).number[0] == 5
-    gap = {n: np.delete(v, range(10, 20)) for n, v in data.items()}
-    assert blocks_of(gap, AXLES).number.tolist() == [0, 1, 4, 5, 6, 7, 8, 9]
-    assert blocks_of(gap, AXLES).streak.tolist() == [1, 2, 1, 2, 3, 4, 5, 6]
+    gap = {n: np.delete(v, range(10, 30)) for n, v in data.items()}
+    assert blocks_of(gap, AXLES).number.tolist() == [0, 1, 6, 7, 8, 9]
+    assert blocks_of(gap, AXLES).streak.tolist() == [1, 2, 1, 2, 3, 4]
 
 
-def test_a_streak_ends_with_a_bad_block_or_a_missing_one() -> None:
-    number, good = np.array([3, 4, 6, 7, 8]), np.array([True, True, True, False, True])
-    assert _streak(number, good, None).tolist() == [1, 2, 1, 0, 1]
-    assert _streak(number, good, (2, 5)).tolist() == [6, 7, 1, 0, 1]
-    assert _streak(number, good, (1, 5)).tolist() == [1, 2, 1, 0, 1]
+def test_a_streak_ends_with_a_bad_block_or_more_than_two_seconds_missing() -> None:
+    number, good = np.array([3, 4, 8, 13, 14, 15]), np.array([True, True, True, True, False, True])
+    assert _streak(number, good, None).tolist() == [1, 2, 3, 1, 0, 1]
+    assert _streak(number, good, (2, 5)).tolist() == [6, 7, 8, 1, 0, 1]
+    assert _streak(number, good, (-2, 5)).tolist() == [1, 2, 3, 1, 0, 1]
 
 
 def test_tables_that_cannot_be_cut_are_refused_with_their_place() -> None:
@@ -224,7 +225,7 @@ def test_twenty_known_blocks_make_a_signature(known: int, learned: bool) -> None
     smooth = replace(
         known_blocks(), roughness=np.where(np.arange(40)[:, None] < known, run.roughness, np.nan)
     )
-    assert (learn_signature(SOIL, [smooth]) is not None) is learned
+    assert (learn_signature(SOIL, [smooth]).roughness is not None) is learned
 
 
 def test_signatures_go_into_a_library_and_come_out_and_damaged_ones_are_refused() -> None:

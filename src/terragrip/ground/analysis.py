@@ -18,6 +18,7 @@ from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Stretch, sections_of
 from terragrip.ground.signals import GROUND
+from terragrip.ground.steps import A_LENGTH
 from terragrip.ground.unknown import UNKNOWN
 from terragrip.soil.blocks import Blocks, estimates_blocks
 from terragrip.soil.estimates import whole_length
@@ -50,7 +51,7 @@ def analyse(
     """
     chosen = settings or Settings()
     blocks = estimates_blocks(estimates, file=run or None)
-    changes = _changes(blocks, chosen)
+    changes = _changes(blocks, chosen, whole_length(estimates.vehicle) / A_LENGTH)
     emissions = Emissions(dict(library.soils) if library else {}, maker(estimates))
     forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
     probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
@@ -109,10 +110,10 @@ def _soils(timeline: Timeline) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys(named) if (named == name).mean() >= 0.02)
 
 
-def _changes(blocks: Blocks, settings: Settings) -> tuple[Change, ...]:
+def _changes(blocks: Blocks, settings: Settings, step: float) -> tuple[Change, ...]:
     if not settings.online:
-        return changes_of(blocks, settings.signals, settings.length)
-    online = OnlineChanges(OnlineSettings(length=settings.length, names=settings.signals))
+        return changes_of(blocks, settings.signals, settings.length, step)
+    online = OnlineChanges(OnlineSettings(length=settings.length, names=settings.signals, step=step))
     return tuple(online.update(blocks))
 
 

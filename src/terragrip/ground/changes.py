@@ -1,7 +1,7 @@
 """Change points of a whole drive: the most probable segmentation, by ruptures' PELT with a conjugate cost (Killick 2012; Fearnhead 2006).
 
-The penalty comes from the data: what a block counts for is measured on the drive's own serial correlation, and the price of a change is the
-chance of one in the distance that a block covers.
+The penalty comes from the data: the noise of a step is measured on the drive itself, and the price of a change is the chance of one in the
+distance that a step covers.
 """
 
 from __future__ import annotations
@@ -13,20 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.arrays import Bools, Floats
+from terragrip.arrays import Floats
 from terragrip.errors import InputError, missing_package
 from terragrip.ground.conjugate import Model
-from terragrip.ground.signals import GROUND, LAWS, SIGNALS, signals_of
-from terragrip.soil.blocks import PERIOD, Blocks
+from terragrip.ground.noise import noise_of
+from terragrip.ground.signals import GROUND, SIGNALS, signals_of
+from terragrip.ground.steps import steps_of
+from terragrip.soil.blocks import Blocks
 
 LENGTH = 30.0
 """Mean way on one ground [m], before anything is known of a drive."""
 LEAST = 4
-"""Fewest blocks of a stretch: 2 s."""
-LEAST_FOR_WEIGHTS = 120
-"""Blocks (a minute) that determine the correlation of neighbours; a shorter drive uses the usual value."""
-_JUMP = 2
-"""PELT tries every second block; where a change lies between its neighbours is then weighed block by block."""
+"""Fewest steps of a stretch."""
 _AT_ONCE = 512
 """Stretches that end at one block and are weighed together."""
 _SHIFT = 20.0
@@ -37,7 +35,7 @@ _SHIFT = 20.0
 class Change:
     """The ground changes at `time` [s], known to `std` [s], with `probability`.
 
-    `shift`: by how many SDs (of a block on one ground) each signal moved. `reported` [s]: when it was known while driving, None afterwards.
+    `shift`: by how many SDs (of a step on one ground) each signal moved. `reported` [s]: when it was known while driving, None afterwards.
     """
 
     time: float
@@ -59,51 +57,40 @@ class Change:
         return cls(**{"reported" if name == "told" else name: value for name, value in data.items()})
 
 
-def changes_of(blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH) -> tuple[Change, ...]:
+def changes_of(
+    blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH, step: float = 0.0
+) -> tuple[Change, ...]:
     """The changes of a whole drive.
 
     `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak, which with
-    the drive's own speed is the price of a change. Raises InputError where ruptures is not installed.
+    the drive's own speed is the price of a change. `step` [m]: way that blocks are put together over (`steps.A_LENGTH` of the vehicle's
+    length); 0: none. Raises InputError where ruptures is not installed.
     """
-    signals, model, measured = _prepared(blocks, names)
-    if len(signals) < 2 * LEAST:
-        return ()
-    driven = float(np.diff(blocks.travelled[measured]).clip(0).sum())
-    chance = float(np.clip(driven / len(signals) / length, 1e-6, 0.5))
-    price = -2 * np.log(chance)
-    cost = _Cost(signals, model)
-    borders = _pelt(cost, price)
-    where, ends = blocks[measured], [0, *borders, len(signals)]
-    return tuple(
-        _change(cost, where, signals, names, (before, border, after), np.exp(-price / 2))
-        for before, border, after in zip(ends, ends[1:], ends[2:], strict=False)
-    )
-
-
-def _prepared(blocks: Blocks, names: Sequence[str]) -> tuple[Floats, Model, Bools]:
-    """Signals of the blocks that hold any (NaN: not measured), their model, and which blocks these are."""
     for name in names:
         if name not in SIGNALS:
             raise InputError(f"there is no signal {name!r}", hint=f"choose one of {', '.join(SIGNALS)}")
-    every = signals_of(blocks, tuple(names))
-    is_measured = np.asarray(np.isfinite(every).any(axis=1))
-    signals, usual = every[is_measured], Model.of(names).weight
-    enough = np.isfinite(signals).sum(axis=0) >= LEAST_FOR_WEIGHTS
-    measured = np.array(
-        [weights(x[np.isfinite(x)]) if ok else w for x, ok, w in zip(signals.T, enough, usual, strict=True)]
+    steps, _, _ = steps_of(blocks, step)
+    every = signals_of(steps, tuple(names))
+    is_measured = np.isfinite(every).any(axis=1)
+    signals, steps = every[is_measured], steps[is_measured]
+    if len(signals) < 2 * LEAST:
+        return ()
+    driven = float(np.diff(steps.travelled).clip(0).sum())
+    chance = float(np.clip(driven / len(signals) / length, 1e-6, 0.5))
+    price = -2 * np.log(chance)
+    noise = noise_of(signals, names)
+    cost = _Cost(signals, Model.of(names, noise))
+    ends = [0, *_pelt(cost, price), len(signals)]
+    return tuple(
+        _change(
+            cost,
+            steps,
+            dict(zip(names, noise.within, strict=True)),
+            (before, border, after),
+            np.exp(-price / 2),
+        )
+        for before, border, after in zip(ends, ends[1:], ends[2:], strict=False)
     )
-    return signals, Model.of(names, measured), is_measured
-
-
-def weights(signal: Floats) -> float:
-    """What a block counts for: (1 - r)/(1 + r), r the correlation of neighbours in a signal (blocks,), as of a first-order process.
-
-    r from medians of squared differences one and six blocks apart, so that changes of the ground do not pass for correlation.
-    """
-    near = np.median((signal[1:] - signal[:-1]) ** 2)
-    far = np.median((signal[6:] - signal[:-6]) ** 2)
-    r = np.clip(1 - near / max(far, 1e-300), 0.0, 0.9)
-    return float((1 - r) / (1 + r))
 
 
 class _Cost:
@@ -148,19 +135,14 @@ def _pelt(cost: _Cost, price: float) -> list[int]:
         from ruptures.detection.pelt import Pelt
     except ImportError:
         raise missing_package("ruptures", "ground", "find the changes of a whole drive") from None
-    search = Pelt(min_size=LEAST, jump=_JUMP)
+    search = Pelt(min_size=LEAST, jump=1)
     search.cost = cost
     search.fit(cost.signal)
     return [int(k) for k in search.predict(pen=price + _SHIFT)[:-1]]
 
 
 def _change(
-    cost: _Cost,
-    blocks: Blocks,
-    signals: Floats,
-    names: Sequence[str],
-    place: tuple[int, int, int],
-    chance: float,
+    cost: _Cost, steps: Blocks, within: Mapping[str, float], place: tuple[int, int, int], chance: float
 ) -> Change:
     """The change at `border` between its neighbours: where it may lie, and how probable it is that there is one at all."""
     before, border, after = place
@@ -172,15 +154,12 @@ def _change(
     weight = np.exp(logs - top)
     odds = np.log(weight.sum()) + top
     weight /= weight.sum()
-    low, high = blocks.end[at - 1], blocks.start[at]
-    middle = 0.5 * (low + high)
+    middle, took = 0.5 * (steps.end[at - 1] + steps.start[at]), steps.end[at] - steps.end[at - 1]
     time = float((weight * middle).sum())
-    variance = (weight * ((middle - time) ** 2 + np.maximum(high - low, PERIOD) ** 2 / 12)).sum()
+    variance = (weight * ((middle - time) ** 2 + took**2 / 12)).sum()
     shift = {}
-    for k, name in enumerate(names):
-        one, other = (
-            part[np.isfinite(part)] for part in (signals[before:border, k], signals[border:after, k])
-        )
+    for (name, sd), signal in zip(within.items(), cost.signal.T, strict=True):
+        one, other = (part[np.isfinite(part)] for part in (signal[before:border], signal[border:after]))
         if one.size and other.size:
-            shift[name] = round(float(other.mean() - one.mean()) / LAWS[name].within, 2)
+            shift[name] = round(float(other.mean() - one.mean()) / sd, 2)
     return Change(time, float(np.sqrt(variance)), float(1 / (1 + np.exp(-odds))), shift)

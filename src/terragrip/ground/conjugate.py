@@ -1,6 +1,6 @@
 """The conjugate model of a signal on one ground: normal, its mean and variance unknown, normal-inverse-gamma before (Murphy 2007).
 
-Neighbouring blocks repeat each other: a block counts for `weight` of an independent one, in the update and in the likelihood alike.
+Neighbouring steps repeat each other: a step counts for `weight` of an independent one, in the update and in the likelihood alike.
 Change points while driving and afterwards use this one model.
 """
 
@@ -13,16 +13,16 @@ import numpy as np
 from scipy.special import gammaln
 
 from terragrip.arrays import Floats
+from terragrip.ground.noise import Noise, usual_noise
 from terragrip.ground.signals import LAWS
-from terragrip.soil.blocks import PERIOD
 
-SHAPE = 4.0
-"""Shape of the prior on the variance: as sure of it as eight independent blocks would make one."""
+SHAPE = 8.0
+"""Shape of the prior on the variance: as sure of it as sixteen independent steps would make one."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Prior of each signal, (signals,) each: mean, count, shape, scale of the normal-inverse-gamma law; what a block counts for."""
+    """Prior of each signal, (signals,) each: mean, count, shape, scale of the normal-inverse-gamma law; what a step counts for."""
 
     mean: Floats
     count: Floats
@@ -31,20 +31,20 @@ class Model:
     weight: Floats
 
     @classmethod
-    def of(cls, names: Sequence[str], weight: Floats | None = None) -> Model:
-        """The model of signals by name; `weight` (signals,) where it was measured on the drive itself."""
+    def of(cls, names: Sequence[str], noise: Noise | None = None) -> Model:
+        """The model of signals by name; `noise` where it was measured on the drive itself."""
         laws = [LAWS[name] for name in names]
-        within = np.array([law.within for law in laws])
+        within, weight = noise or usual_noise(names)
         return cls(
             mean=np.array([law.mean for law in laws]),
             count=(within / np.array([law.sd for law in laws])) ** 2,
             shape=np.full(len(laws), SHAPE),
             scale=SHAPE * within**2,
-            weight=np.array([min(PERIOD / law.repeat, 1.0) for law in laws]) if weight is None else weight,
+            weight=weight,
         )
 
     def evidence(self, count: Floats, total: Floats, square: Floats) -> Floats:
-        """Log evidence of stretches, summed over signals: from the number of blocks with each signal, their sums and sums of squares, all
+        """Log evidence of stretches, summed over signals: from the number of steps with each signal, their sums and sums of squares, all
         (stretches, signals)."""
         n = count * self.weight
         kappa, alpha = self.count + n, self.shape + n / 2

@@ -108,14 +108,16 @@ class Emissions:
                 columns.append(several if roughness is None else several + textures(roughness))
                 continue
             if roughness is not None:
-                own = bivariate(roughness - texture.roughness, texture.roughness_covariance)
+                own = bivariate(roughness - texture[0], texture[1])
                 mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
             columns.append(mine[:, None])
         return np.concatenate([*columns, cells(blocks, roughness)], axis=1)
 
-    def _texture(self, signature: Signature | None) -> Signature | None:
-        """The signature where its roughness can be compared with these estimates'."""
-        return signature if signature is not None and self._comparable(signature) else None
+    def _texture(self, signature: Signature | None) -> tuple[Floats, Floats] | None:
+        """Mean and covariance of a soil's roughness, where they are known and can be compared with these estimates'."""
+        if signature is None or signature.roughness is None or signature.roughness_covariance is None:
+            return None
+        return (signature.roughness, signature.roughness_covariance) if self._comparable(signature) else None
 
     def _comparable(self, signature: Signature) -> bool:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by

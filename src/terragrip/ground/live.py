@@ -15,15 +15,17 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.ground.changes import Change
 from terragrip.ground.emissions import Emissions
-from terragrip.ground.online_changes import OnlineChanges
+from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
 from terragrip.ground.recognition import ForwardFilter, by_soil
+from terragrip.ground.steps import A_LENGTH
 from terragrip.soil.blocks import PERIOD, Blocks, blocks_of, driven_wheels, needed_columns
+from terragrip.soil.estimates import whole_length
 from terragrip.soil.library import SoilLibrary
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimate, TractionEstimator
 
-_VERSION = 1
+_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class LiveGround:
         self._columns = tuple(name for name in every if name in there)
         self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method)
         self._filter = ForwardFilter.begin(self._emissions)
-        self._changes = OnlineChanges()
+        self._changes = OnlineChanges(OnlineSettings(step=whole_length(estimator.vehicle) / A_LENGTH))
         self._origin: float | None = None
         self._number = 0
         self._before: tuple[int, int] | None = None

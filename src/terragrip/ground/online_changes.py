@@ -16,47 +16,57 @@ from scipy.special import gammaln
 from terragrip.arrays import Floats
 from terragrip.ground.changes import Change
 from terragrip.ground.conjugate import Model
+from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
+from terragrip.ground.steps import A_LENGTH, joined, steps_of
 from terragrip.soil.blocks import PERIOD, Blocks
 
 _MOST = 240
-"""Run lengths kept: two minutes; a longer run is as well known as it will ever be."""
+"""Run lengths kept, and steps that the noise is measured on: 40 lengths of the vehicle."""
 _LEAST = 1e-7
 _RUNS = ("_mean", "_count", "_shape", "_scale")
+_EACH = ("_probability", "_age")
 
 
 @dataclass(frozen=True)
 class OnlineSettings:
-    """`length` [m]: mean distance on one ground; `threshold`: probability at which a change is reported; `recent` [s]: span searched."""
+    """`length` [m]: mean distance on one ground; `threshold`: probability at which a change is reported; `recent`: steps searched;
+    `step` [m]: way that blocks are put together over, 0: none (`steps.steps_of`)."""
 
     length: float = 30.0
     threshold: float = 0.8
-    recent: float = 10.0
+    recent: int = 2 * A_LENGTH
     names: tuple[str, ...] = GROUND
+    step: float = 0.0
 
 
 class OnlineChanges:
-    """Receives blocks in order and reports changes; `probability` is that of a change within the last `recent` seconds."""
+    """Receives blocks in order and reports changes; `probability` is that of a change within the last `recent` steps."""
 
     def __init__(self, settings: OnlineSettings | None = None) -> None:
         self.settings = settings or OnlineSettings()
-        model = Model.of(self.settings.names)
-        self._weight = model.weight
-        self._prior = (model.mean, model.count, model.shape, model.scale)
-        self._mean, self._count, self._shape, self._scale = (x[None, :].copy() for x in self._prior)
+        self._signals = np.zeros((0, len(self.settings.names)))
+        self._prior()
+        self._mean, self._count, self._shape, self._scale = (x[None, :].copy() for x in self._fresh)
         self._probability = np.ones(1)
         self._begin = np.full(1, np.nan)
+        self._age = np.zeros(1)
         self._travelled: float | None = None
-        self._quiet_until = -np.inf
+        self._quiet = 0
+        self._pending: Blocks | None = None
+        self._from: float | None = None
         self.probability = 0.0
 
     def update(self, blocks: Blocks) -> list[Change]:
         """Add blocks, one or many; returns the changes that they show."""
+        every = blocks if self._pending is None else joined(self._pending, blocks)
+        steps, rest, self._from = steps_of(every, self.settings.step, self._from)
+        self._pending = rest if len(rest) else None
         result = []
-        signals = signals_of(blocks, self.settings.names)
-        for k in range(len(blocks)):
+        signals = signals_of(steps, self.settings.names)
+        for k in range(len(steps)):
             change = self._add(
-                signals[k], float(blocks.start[k]), float(blocks.end[k]), float(blocks.travelled[k])
+                signals[k], float(steps.start[k]), float(steps.end[k]), float(steps.travelled[k])
             )
             if change is not None:
                 result.append(change)
@@ -64,24 +74,33 @@ class OnlineChanges:
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain values, exact."""
-        quiet = None if self._quiet_until == -np.inf else self._quiet_until
-        runs = {name: getattr(self, name).tolist() for name in (*_RUNS, "_probability")}
         begin = [None if np.isnan(x) else float(x) for x in self._begin]
+        pending = self._pending
         return {
-            **runs,
+            **{name: getattr(self, name).tolist() for name in (*_RUNS, *_EACH)},
             "_begin": begin,
+            "signals": [[None if np.isnan(x) else x for x in row] for row in self._signals.tolist()],
             "travelled": self._travelled,
-            "quiet": quiet,
+            "quiet": self._quiet,
+            "pending": None if pending is None else {k: v.tolist() for k, v in vars(pending).items()},
+            "from": self._from,
             "probability": self.probability,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take the state of `to_dict`; raises KeyError, TypeError or ValueError where it is none."""
-        for name in (*_RUNS, "_probability"):
+        for name in (*_RUNS, *_EACH, "_begin"):
             setattr(self, name, np.array(state[name], dtype=float))
-        self._begin = np.array([np.nan if x is None else x for x in state["_begin"]], dtype=float)
+        self._signals = np.array(state["signals"], dtype=float).reshape(-1, len(self.settings.names))
+        self._prior()
         self._travelled, self.probability = state["travelled"], float(state["probability"])
-        self._quiet_until = -np.inf if state["quiet"] is None else float(state["quiet"])
+        self._quiet, self._from, pending = int(state["quiet"]), state["from"], state["pending"]
+        self._pending = None if pending is None else Blocks(**{k: np.array(v) for k, v in pending.items()})
+
+    def _prior(self) -> None:
+        """The law of a new ground, by the noise of the steps so far."""
+        model = Model.of(self.settings.names, noise_of(self._signals, self.settings.names))
+        self._weight, self._fresh = model.weight, (model.mean, model.count, model.shape, model.scale)
 
     def _add(self, x: Floats, start: float, end: float, travelled: float) -> Change | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
@@ -90,11 +109,14 @@ class OnlineChanges:
         grown = self._probability * (1 - hazard)
         self._probability = np.append(grown, hazard)
         self._begin = np.append(self._begin, start)
-        for name, prior in zip(_RUNS, self._prior, strict=True):
+        self._age = np.append(self._age + 1, 1)
+        for name, prior in zip(_RUNS, self._fresh, strict=True):
             setattr(self, name, np.vstack([getattr(self, name), prior]))
         finite = np.isfinite(x)
         if finite.any():
             self._learn(np.where(finite, x, 0.0), np.where(finite, self._weight, 0.0))
+        self._signals = np.vstack([self._signals[1 - _MOST :], x])
+        self._prior()
         self._prune()
         return self._report(end)
 
@@ -119,17 +141,18 @@ class OnlineChanges:
             keep[: len(keep) - _MOST] = False
         if not keep.any() or keep.all():
             return
-        for name in (*_RUNS, "_probability", "_begin"):
+        for name in (*_RUNS, *_EACH, "_begin"):
             setattr(self, name, getattr(self, name)[keep])
         self._probability = self._probability / self._probability.sum()
 
     def _report(self, now: float) -> Change | None:
-        recent = self._begin > max(now - self.settings.recent, self._quiet_until)
+        self._quiet += 1
+        recent = self._age <= min(self.settings.recent, self._quiet - 1)
         self.probability = float(self._probability[recent].sum())
         if self.probability < self.settings.threshold:
             return None
         weight, at = self._probability[recent] / self.probability, self._begin[recent]
         time = float((weight * at).sum())
-        self._quiet_until = now
+        self._quiet = 0
         std = float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12))
         return Change(time, std, self.probability, reported=now)

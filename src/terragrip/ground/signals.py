@@ -23,33 +23,36 @@ SIGNALS = (
 
 _SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
 """Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
+_SHOWN = 0.5
+"""The scale counts from where slip and mu tell at least this much of it (inverse variance) beside what is known before."""
+_OFFSET = 0.02
+"""rho_s at which its errors (drawbar's zero, slope) are as much additive as the ground's variation is proportional."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """What is known of a signal before a drive: mean and SD over all grounds, SD on one, for how long [s] blocks repeat each other.
+    """What is known of a signal before a drive: mean and SD over all grounds, and SD on one, from place to place.
 
-    The figures are those of the simulated campaign's soils, development seeds 1000 and 1010.
+    Resistance and scale are in logarithms: ground varies by a share of itself, hard ground by little and soft ground by much.
     """
 
     mean: float
     sd: float
     within: float
-    repeat: float
 
 
 LAWS: dict[str, Law] = {
-    "soil_resistance": Law(0.12, 0.07, 0.018, 2.0),
-    "curve_scale": Law(0.85, 0.40, 0.08, 2.0),
-    "soil_resistance_sd": Law(-5.7, 0.8, 0.68, 1.0),
-    "adhesion_sd": Law(-5.1, 0.8, 0.55, 1.0),
-    "slip": Law(0.12, 0.12, 0.03, 4.0),
-    "adhesion": Law(0.25, 0.15, 0.03, 4.0),
-    "curve_a": Law(0.77, 0.4, 0.1, 10.0),
-    "slip_sd": Law(-4.2, 0.5, 0.35, 1.5),
-    "soil_resistance_std": Law(-5.2, 0.5, 0.2, 4.0),
-    "adhesion_std": Law(-4.8, 0.5, 0.2, 3.0),
-    "slip_std": Law(-3.6, 0.5, 0.2, 5.0),
+    "soil_resistance": Law(-1.97, 0.5, 0.12),
+    "curve_scale": Law(-0.16, 0.45, 0.10),
+    "soil_resistance_sd": Law(-5.7, 0.8, 0.45),
+    "adhesion_sd": Law(-5.1, 0.8, 0.4),
+    "slip": Law(0.12, 0.12, 0.03),
+    "adhesion": Law(0.25, 0.15, 0.03),
+    "curve_a": Law(0.77, 0.4, 0.1),
+    "slip_sd": Law(-4.2, 0.5, 0.35),
+    "soil_resistance_std": Law(-5.2, 0.5, 0.2),
+    "adhesion_std": Law(-4.8, 0.5, 0.2),
+    "slip_std": Law(-3.6, 0.5, 0.2),
 }
 
 
@@ -57,8 +60,8 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     """Signals (blocks, names); NaN where a block shows nothing. Raises ValueError on a name that is none of `SIGNALS`."""
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
-        "soil_resistance": blocks.resistance,
-        "curve_scale": curve_scale(slip, adhesion),
+        "soil_resistance": np.log(np.maximum(blocks.resistance, -_OFFSET / 2) + _OFFSET),
+        "curve_scale": _log_scale(slip, adhesion, blocks.slip_variance.mean(axis=1)),
         "soil_resistance_sd": blocks.roughness[:, 0],
         "adhesion_sd": blocks.roughness[:, 1],
         "slip": slip,
@@ -78,6 +81,16 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
 
 def _log_sd(variance: Floats) -> Floats:
     return np.asarray(0.5 * np.log(variance + FLOOR**2))
+
+
+def _log_scale(slip: Floats, adhesion: Floats, slip_variance: Floats) -> Floats:
+    """ln of the curve's scale, (blocks,); NaN where slip is too small beside its own error to show the curve."""
+    curve = CURVES["exponential"]
+    shape, slope = curve.value(slip, {"a": 1.0}), curve.slope(slip, {"a": 1.0})
+    variance = _ADHESION_SD**2 + (_SCALE * slope) ** 2 * slip_variance
+    shown = (_SCALE_SD * shape) ** 2 > _SHOWN * variance
+    scale = np.maximum(curve_scale(slip, adhesion), 0.1 * _SCALE)
+    return np.where(shown, np.log(scale), np.nan)
 
 
 def curve_scale(slip: Floats, adhesion: Floats) -> Floats:

@@ -22,7 +22,7 @@ from terragrip.ground.laws import (
     tempered,
 )
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.blocks import Blocks
+from terragrip.soil.blocks import LARGEST_SLIP, Blocks
 from terragrip.soil.signature import OFFSET
 
 UNKNOWN = "unknown"
@@ -73,12 +73,12 @@ def _adhesion(blocks: Blocks) -> Floats:
     """Log density of mu about the curve of each scale, (blocks, scales); as `signature.curve_error` has it."""
     curve = CURVES["exponential"]
     shape = (curve.value(blocks.slip, {"a": 1.0}) * blocks.share).sum(axis=1)[:, None]
-    slope = curve.slope(blocks.slip, {"a": 1.0})[:, None, :]
+    height = curve.value(np.array([LARGEST_SLIP]), {"a": 1.0})
+    by_slip = np.minimum(
+        np.abs(curve.slope(blocks.slip, {"a": 1.0})) * np.sqrt(blocks.slip_variance), 0.5 * height
+    )
     scale = SCALES * np.abs(shape) + OFFSET
     error = (blocks.mean_adhesion[:, None] - SCALES * shape) / scale
-    known = np.sqrt(
-        blocks.adhesion_variance[:, None, :]
-        + (SCALES[:, None] * slope) ** 2 * blocks.slip_variance[:, None, :]
-    )
+    known = np.hypot(np.sqrt(blocks.adhesion_variance)[:, None, :], SCALES[:, None] * by_slip[:, None, :])
     own = ((known * blocks.share[:, None, :]).sum(axis=2) / scale) ** 2
     return normal(error, _SCALE_SPREAD**2 + own) - np.log(scale)

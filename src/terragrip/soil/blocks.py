@@ -31,6 +31,8 @@ LARGEST_SLIP = 0.6
 """Slip beyond which the ground cannot be read: the vehicle digs (and the paper's bins end)."""
 FLOOR = 1e-4
 """Added to standard deviations before their logarithm, so that held values stay finite."""
+_LONGEST_SKIP = 4
+"""Periods (2 s) without a row that do not end a streak: logs of 1 Hz have none in every second period. A gap is an event of its own."""
 _USABLE = ("", "immobilization", "outlier")
 
 
@@ -217,9 +219,9 @@ def estimates_blocks(estimates: Estimates, rows: Bools | None = None, file: str 
 
 
 def _streak(number: NDArray[np.int64], good: Bools, before: tuple[int, int] | None) -> NDArray[np.int64]:
-    """The number of consecutive good blocks up to and including each block, (blocks,); a skipped number ends a streak."""
+    """The number of consecutive good blocks up to and including each block, (blocks,); more skipped than `_LONGEST_SKIP` end a streak."""
     last, run = before or (int(number[0]) - 1, 0)
-    follows = number == np.concatenate(([last], number[:-1])) + 1
+    follows = number <= np.concatenate(([last], number[:-1])) + _LONGEST_SKIP
     out = np.empty(len(number), dtype=np.int64)
     for k in range(len(number)):
         run = (run + 1 if follows[k] else 1) if good[k] else 0

@@ -15,7 +15,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.blocks import Blocks
+from terragrip.soil.blocks import LARGEST_SLIP, Blocks
 from terragrip.soil.library import Soil
 
 if TYPE_CHECKING:
@@ -34,15 +34,16 @@ LEAST_SD = (0.005, 0.03)
 class Signature:
     """A soil's blocks: level (rho_s, relative error of mu about the curve) and roughness (see `Blocks`), normally distributed.
 
-    `level_sd`, `level_correlation`: of the ground alone; the estimates' own variance is added, block by block.
+    `level_sd`, `level_correlation`: of the ground alone; the estimates' own variance is added, block by block. `roughness` and its
+    covariance are None where the logs are too slow to show it (under 8 Hz).
     `made_by`: method of the estimates, since methods smooth differently. `blocks`, `runs`: the amount of data.
     """
 
     level: Floats
     level_sd: Floats
     level_correlation: float
-    roughness: Floats
-    roughness_covariance: Floats
+    roughness: Floats | None
+    roughness_covariance: Floats | None
     made_by: str
     blocks: int
     runs: int
@@ -54,12 +55,15 @@ class Signature:
     @classmethod
     def from_dict(cls, data: Any, place: str, file: str | os.PathLike[str] | None = None) -> Signature:
         """From a library's entry; raises InputError where it is not what `to_dict` gives."""
-        shapes = {"level": (2,), "level_sd": (2,), "roughness": (2,), "roughness_covariance": (2, 2)}
+        shapes: dict[str, tuple[int, ...]] = {"level": (2,), "level_sd": (2,)}
         try:
+            if data["roughness"] is not None:
+                shapes |= {"roughness": (2,), "roughness_covariance": (2, 2)}
             arrays = {k: np.array(data[k], dtype=float).reshape(shape) for k, shape in shapes.items()}
             correlation = float(data["level_correlation"])
             counts = {k: int(data[k]) for k in ("blocks", "runs")}
-            np.linalg.cholesky(arrays["roughness_covariance"])
+            if "roughness" in arrays:
+                np.linalg.cholesky(arrays["roughness_covariance"])
             sound = all(np.isfinite(x).all() for x in arrays.values()) and bool(
                 (arrays["level_sd"] > 0).all()
             )
@@ -77,8 +81,8 @@ class Signature:
             arrays["level"],
             arrays["level_sd"],
             correlation,
-            arrays["roughness"],
-            arrays["roughness_covariance"],
+            arrays.get("roughness"),
+            arrays.get("roughness_covariance"),
             str(data.get("made_by", "")),
             counts["blocks"],
             counts["runs"],
@@ -95,14 +99,16 @@ def curve_error(soil: Soil, blocks: Blocks) -> tuple[Floats, Floats, Floats]:
     """Relative error of mu about the soil's curve, its variance according to the estimates, and its scale, (blocks,) each.
 
     error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are assumed alike; that of slip
-    enters by the curve's slope.
+    enters by the curve's slope, up to half the curve's height.
     """
     plain = {k: v for k, v in soil.parameters.items() if k != "intercept"}
     curve = soil.value(blocks.slip)
     slope = CURVES[soil.model].slope(blocks.slip, plain)
     scale = np.abs((curve * blocks.share).sum(axis=1)) + OFFSET
     error = ((blocks.adhesion - curve) * blocks.share).sum(axis=1) / scale
-    known = np.sqrt(blocks.adhesion_variance + slope**2 * blocks.slip_variance)
+    height = np.abs(soil.value(np.array([LARGEST_SLIP])))
+    by_slip = np.minimum(np.abs(slope) * np.sqrt(blocks.slip_variance), 0.5 * height)
+    known = np.hypot(np.sqrt(blocks.adhesion_variance), by_slip)
     return error, ((known * blocks.share).sum(axis=1) / scale) ** 2, scale
 
 
@@ -124,17 +130,17 @@ def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Si
     level, noise, rough = np.concatenate(levels), np.concatenate(noises), np.concatenate(roughness)
     measured = np.isfinite(level).all(axis=1) & np.isfinite(noise).all(axis=1)
     level, noise, rough = level[measured], noise[measured], rough[np.isfinite(rough).all(axis=1)]
-    if min(len(level), len(rough)) < LEAST_BLOCKS:
+    if len(level) < LEAST_BLOCKS:
         return None
     middle, sd = _ground(level, noise)
     scaled = (level - middle) / np.sqrt(sd**2 + noise)
-    covariance = np.cov(rough, rowvar=False) + 0.01 * np.eye(rough.shape[1])
+    shown = len(rough) >= LEAST_BLOCKS
     return Signature(
         middle,
         sd,
         _correlation(scaled),
-        rough.mean(axis=0),
-        covariance,
+        rough.mean(axis=0) if shown else None,
+        np.cov(rough, rowvar=False) + 0.01 * np.eye(rough.shape[1]) if shown else None,
         made_by,
         len(level),
         len(runs),
