@@ -46,7 +46,7 @@ def ran(
     Each soil is learned by the paper's form without asking whether another fits better, half of such a call's time: the fleet of two
     machines is asked, below, and tests/soil/test_choice.py.
     """
-    monkeypatch.setattr("terragrip.soil.learn._compared", lambda _: None)
+    monkeypatch.setattr("terragrip.soil.learn._compared", lambda *_: None)
 
     def run(*words: object) -> tuple[int, str, str]:
         code = main(call(place, *words, "--scheduler", scheduler))
@@ -61,7 +61,7 @@ def first_call(tmp_path_factory: pytest.TempPathFactory, scheduler: str) -> Path
     """The data set of a call on the logs of `place`; not to be changed."""
     place = furnished(tmp_path_factory.mktemp("first_call"))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("terragrip.soil.learn._compared", lambda _: None)  # as `ran`
+        patch.setattr("terragrip.soil.learn._compared", lambda *_: None)  # as `ran`
         assert main(call(place, "--scheduler", scheduler, "--quiet")) == 0
     return place / "out"
 
