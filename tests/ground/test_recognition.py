@@ -36,7 +36,10 @@ def test_filter_and_smoother_are_those_of_dense_matrices(library):
     emissions, chain = Emissions(dict(library)), Chain(length=5.0, unknown=0.2)
     blocks = estimates_blocks(drive(1, [("grass", GRASS, 8), ("fine", FINE, 8)]))
     forward = ForwardFilter.begin(emissions, chain).update(blocks)
-    likelihood, start = np.exp(emissions.log_likelihood(blocks)), chain.start(emissions.states)
+    likelihood, start = (
+        np.exp(emissions.log_likelihood(blocks, np.ones(len(blocks)))),
+        chain.start(emissions.states),
+    )
     n = len(start)
     driven = np.diff(blocks.travelled, prepend=blocks.travelled[0])
     steps = [(s := np.exp(-d / 5.0)) * np.eye(n) + (1 - s) * np.tile(start, (n, 1)) for d in driven]
@@ -188,3 +191,17 @@ def test_slip_that_is_not_known_leaves_the_soil_to_the_resistance(library):
     }
     ground, _ = analyse(replace(blind, columns={**blind.columns, **wide}), library)
     assert [section.soil for section in ground.sections] == ["grass"]
+
+
+def test_slowly_driven_ground_counts_by_the_way():
+    """Half the speed, half the ground: the evidence of a block halves where it is of the same wheels' ground, and is not more at speed."""
+    blocks = estimates_blocks(drive(6, [("fine", FINE, 20)]))
+    library = literature_soils()
+    emissions = Emissions(dict(library), length=4.0)
+    slow, slower, fast = (
+        emissions.log_likelihood(blocks, np.full(len(blocks), way))[blocks.known] for way in (0.2, 0.1, 9.0)
+    )
+    timed = Emissions(dict(library)).log_likelihood(blocks, np.full(len(blocks), 0.2))[blocks.known]
+    levels = slow - slower  # roughness, which counts by time, is in both
+    np.testing.assert_allclose(levels, 0.1 / 3.0 * (fast - slow) / (0.5 / 3.5 - 0.2 / 3.0), rtol=1e-9)
+    np.testing.assert_allclose(fast, timed, rtol=1e-12)

@@ -51,15 +51,16 @@ def analyse(
     """
     chosen = settings or Settings()
     blocks = estimates_blocks(estimates, file=run or None)
-    changes = _changes(blocks, chosen, whole_length(estimates.vehicle) / A_LENGTH)
-    emissions = Emissions(dict(library.soils) if library else {}, maker(estimates))
+    length = whole_length(estimates.vehicle)
+    changes = _changes(blocks, chosen, length / A_LENGTH)
+    emissions = Emissions(dict(library.soils) if library else {}, maker(estimates), length)
     forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
     probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
     timeline = Timeline(
         blocks.start, emissions.names, probabilities, blocks.known, block_labels(estimates, blocks)
     )
     stretches = _stretches(estimates, changes, timeline)
-    sections = sections_of(estimates, stretches, whole_length(estimates.vehicle))
+    sections = sections_of(estimates, stretches, length)
     soils = _soils(timeline) if library else ()
     ground = Ground(
         run,

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from terragrip.arrays import Floats
 from terragrip.ground.laws import (
     BROAD_RESISTANCE,
-    LEVEL_TIME,
     ROUGHNESS_TIME,
     bivariate,
     broad_level,
     broad_roughness,
+    level_weight,
     mixed,
     normal,
     tempered,
@@ -39,10 +39,12 @@ class Emissions:
     """Log likelihoods of blocks on the soils of a library, and on the cells of the unknown one.
 
     `made_by`: method of the estimates (`signature.maker`); a signature learned by another method tells nothing of roughness.
+    `length` [m]: of vehicle and tool, over which levels repeat each other; 0: not known.
     """
 
     soils: Mapping[str, Soil]
     made_by: str = ""
+    length: float = 0.0
 
     @cached_property
     def signatures(self) -> dict[str, Signature | None]:
@@ -83,25 +85,26 @@ class Emissions:
         per = [1 if self._texture(one) else ROUGHNESSES.size for one in self.signatures.values()]
         return np.repeat(np.arange(len(per) + 1), [*per, CELLS])
 
-    def log_likelihood(self, blocks: Blocks) -> Floats:
-        """(blocks, states), tempered: a block counts for PERIOD over the time in which blocks repeat each other.
+    def log_likelihood(self, blocks: Blocks, driven: Floats) -> Floats:
+        """(blocks, states), tempered: a block counts for its share of the time and of the way over which blocks repeat each other.
 
-        0 where a block tells nothing of the ground.
+        `driven` (blocks,): way since the block before [m]. 0 where a block tells nothing of the ground.
         """
         out = np.zeros((len(blocks), self.states.size))
+        weight = level_weight(driven, self.length)
         rough = np.isfinite(blocks.roughness).all(axis=1)
         for rows, is_rough in ((blocks.known & rough, True), (blocks.known & ~rough, False)):
             if rows.any():
-                out[rows] = self._likelihood(blocks[rows], is_rough)
+                out[rows] = self._likelihood(blocks[rows], is_rough, weight[rows])
         return out
 
-    def _likelihood(self, blocks: Blocks, rough: bool) -> Floats:
+    def _likelihood(self, blocks: Blocks, rough: bool, weight: Floats) -> Floats:
         roughness = blocks.roughness if rough else None
         level = broad_level(blocks)
         columns = []
         for name, soil in self.soils.items():
             signature = self.signatures[name]
-            mine = tempered(mixed(_level(soil, signature, blocks), level), LEVEL_TIME)
+            mine = weight * mixed(_level(soil, signature, blocks), level)
             texture = self._texture(signature)
             if texture is None:
                 several = np.repeat(mine[:, None], ROUGHNESSES.size, axis=1)
@@ -111,7 +114,7 @@ class Emissions:
                 own = bivariate(roughness - texture[0], texture[1])
                 mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
             columns.append(mine[:, None])
-        return np.concatenate([*columns, cells(blocks, roughness)], axis=1)
+        return np.concatenate([*columns, cells(blocks, roughness, weight)], axis=1)
 
     def _texture(self, signature: Signature | None) -> tuple[Floats, Floats] | None:
         """Mean and covariance of a soil's roughness, where they are known and can be compared with these estimates'."""

@@ -11,6 +11,8 @@ from terragrip.soil.signature import OFFSET
 
 LEVEL_TIME, ROUGHNESS_TIME = 3.5, 1.3
 """Seconds for which neighbouring blocks repeat each other. All soils alike: else the sharper of two laws would win by its name."""
+LEVEL_WAY = 0.75
+"""Lengths of vehicle and tool over which levels repeat each other: the same ground is under one wheel after the other."""
 BROAD_RESISTANCE, BROAD_SCALE = (0.12, 0.08), (0.85, 0.5)
 """Mean and SD over all grounds of rho_s (0.02 to 0.3 on fields and roads; ASABE D497) and of the scale of mu's curve."""
 ADHESION_ROUGHNESS = 0.6
@@ -23,6 +25,15 @@ _STRAY = 0.01
 def tempered(logs: Floats, seconds: float) -> Floats:
     """Log likelihoods of blocks that repeat each other for `seconds`: each counts for PERIOD / seconds."""
     return logs * min(PERIOD / seconds, 1.0)
+
+
+def level_weight(driven: Floats, length: float) -> Floats:
+    """What the level of each block counts for, (blocks,), from the way driven since the one before [m] and the vehicle's length [m].
+
+    Of length 0 nothing is known: by time alone.
+    """
+    usual = np.full(len(driven), PERIOD / LEVEL_TIME)
+    return np.minimum(usual, driven / (LEVEL_WAY * length)) if length else usual
 
 
 def mixed(mine: Floats, broad: Floats) -> Floats:

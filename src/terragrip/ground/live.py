@@ -61,9 +61,10 @@ class LiveGround:
         every = (*needed_columns(tuple(self._axle_of)), *optional, *loads, "curve_a")
         there = {"time", "event", *estimator.columns}
         self._columns = tuple(name for name in every if name in there)
-        self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method)
+        length = whole_length(estimator.vehicle)
+        self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method, length)
         self._filter = ForwardFilter.begin(self._emissions)
-        self._changes = OnlineChanges(OnlineSettings(step=whole_length(estimator.vehicle) / A_LENGTH))
+        self._changes = OnlineChanges(OnlineSettings(step=length / A_LENGTH))
         self._origin: float | None = None
         self._number = 0
         self._before: tuple[int, int] | None = None

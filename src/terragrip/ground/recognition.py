@@ -47,7 +47,9 @@ class ForwardFilter:
 
     def update(self, blocks: Blocks) -> Forward:
         """Take blocks in order, one or many: the results are the same."""
-        logs = self.emissions.log_likelihood(blocks)
+        before = blocks.travelled[:1] if self.travelled is None else np.array([self.travelled])
+        driven = np.diff(np.concatenate((before, blocks.travelled))).clip(0)
+        logs = self.emissions.log_likelihood(blocks, driven)
         weight = np.exp(logs - logs.max(axis=1, keepdims=True)) if len(logs) else logs
         start, filtered, anew = (
             self.chain.start(self.emissions.states),
@@ -55,8 +57,7 @@ class ForwardFilter:
             np.zeros(len(logs)),
         )
         for k, travelled in enumerate(blocks.travelled):
-            driven = 0.0 if self.travelled is None else travelled - self.travelled
-            anew[k] = -np.expm1(-max(driven, 0.0) / self.chain.length)
+            anew[k] = -np.expm1(-driven[k] / self.chain.length)
             moved = ((1 - anew[k]) * self.probabilities + anew[k] * start) * weight[k]
             self.probabilities = moved / moved.sum()
             self.travelled = float(travelled)

@@ -12,7 +12,6 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.ground.laws import (
     ADHESION_ROUGHNESS,
-    LEVEL_TIME,
     ROUGHNESS_TIME,
     bivariate,
     broad_level,
@@ -44,8 +43,9 @@ _LEAST_RESISTANCE_SD = 0.01
 _ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 
 
-def cells(blocks: Blocks, roughness: Floats | None) -> Floats:
-    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known."""
+def cells(blocks: Blocks, roughness: Floats | None, weight: Floats) -> Floats:
+    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known;
+    `weight` (blocks,): what each block's level counts for."""
     rows = len(blocks)
     level = broad_level(blocks)
     broad = level[:, None, None, None]
@@ -53,10 +53,10 @@ def cells(blocks: Blocks, roughness: Floats | None) -> Floats:
     spread = (_RESISTANCE_SPREAD * np.exp(ROUGHNESSES)) ** 2 + _LEAST_RESISTANCE_SD**2
     off = blocks.resistance[:, None, None] - RESISTANCES
     resistance = normal(off, spread[:, None] + blocks.resistance_variance[:, None, None])[:, :, None, :]
-    out = tempered(mixed(adhesion + resistance, broad), LEVEL_TIME)
+    out = weight[:, None, None, None] * mixed(adhesion + resistance, broad)
     if roughness is not None:
         out = out + textures(roughness)[:, :, None, None]
-    none = tempered(level, LEVEL_TIME)
+    none = weight * level
     if roughness is not None:
         none = none + tempered(broad_roughness(roughness), ROUGHNESS_TIME)
     return np.column_stack([out.reshape(rows, GRID), none])
