@@ -300,3 +300,10 @@ def test_what_is_written_is_json_without_nan(tmp_path):
     data = json.loads((tmp_path / "advice.json").read_text(), parse_constant=lambda text: pytest.fail(text))
     assert {"best_efficiency", "best_productivity", "front", "actions", "missing"} <= set(data)
     assert all({"what", "why", "gain", "interval"} <= set(action) for action in data["actions"])
+
+
+def test_a_ground_that_pushes_is_said_to_be_none():
+    """A mean resistance below 0 was counted as 0, and the efficiency stood there without a word."""
+    right, off = only([drive(metres=600)]), only([drive(metres=600, resistance=-0.01)])
+    assert not any("no ground pushes" in sentence for sentence in right.missing)
+    assert "soil resistance is -0.01" in off.missing[0]

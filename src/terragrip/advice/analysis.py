@@ -108,6 +108,12 @@ def _of_soil(
     power = best_of(over, over.productivity)
     missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(samples, vehicle))
     beyond = own is None and power.slip > curves.reach
+    if drive["soil_resistance"] < 0:
+        missing.insert(
+            0,
+            f"soil resistance is {drive['soil_resistance']:.3f} in the mean, and no ground pushes: the torques' scale, the drawbar's "
+            "zero or a slope is off, and every efficiency here is too high; calibrate, and drive the same way back too",
+        )
     if beyond:
         missing.append(
             f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
