@@ -19,7 +19,7 @@ from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
 from terragrip.ground.steps import A_LENGTH, joined, steps_of
-from terragrip.soil.blocks import PERIOD, Blocks
+from terragrip.soil.blocks import Blocks
 
 _MOST = 240
 """Run lengths kept, and steps that the noise is measured on: 40 lengths of the vehicle."""
@@ -154,5 +154,6 @@ class OnlineChanges:
         weight, at = self._probability[recent] / self.probability, self._begin[recent]
         time = float((weight * at).sum())
         self._quiet = 0
-        std = float(np.sqrt((weight * (at - time) ** 2).sum() + PERIOD**2 / 12))
+        took = now - float(self._begin[-1])
+        std = float(np.sqrt((weight * (at - time) ** 2).sum() + took**2 / 12))
         return Change(time, std, self.probability, reported=now)
