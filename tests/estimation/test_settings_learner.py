@@ -101,4 +101,6 @@ def test_a_ground_speed_in_another_unit_is_named_once_it_was_found_twice(
     out = learned_by(SettingsLearner(robot(sensors=UNKNOWN), tuple(log.channels), {}, {}), wrong)
     doubts = {row: learned.doubts for row, learned in out.items() if learned.doubts}
     assert list(doubts) == ([2000] if said else [])
-    assert all(said in text for texts in doubts.values() for text in texts)
+    for texts in doubts.values():
+        assert list(texts) == ["rims"]
+        assert all(said in text for text in texts["rims"])

@@ -129,7 +129,11 @@ def test_stuck_comes_in_time_though_the_estimate_lags() -> None:
     [
         (0.0, 0.3, "stuck"),  # hardly free: under four tenths of the rims
         (0.0, 0.5, ""),
-        (1.8, 0.3, ""),  # what was seen more than a second and a half ago counts no more
+        (
+            1.8,
+            0.3,
+            "immobilization",
+        ),  # what was seen more than a second and a half ago is no longer stuck; it slips by .7
     ],
 )
 def test_a_machine_is_stuck_until_it_comes_free_or_is_not_seen_for_long(

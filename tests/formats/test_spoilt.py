@@ -60,7 +60,7 @@ def test_signs_between_thousands_are_named(tmp_path: Path) -> None:
     assert "write numbers without a thousands separator" in note
 
 
-@pytest.mark.parametrize("form", ["%M:%S.0", "%d.%m.%y %H:%M:%S", "%d.%m.%Y %H:%M"])
+@pytest.mark.parametrize("form", ["%M:%S.0", "%m-%d-%y %H:%M:%S", "%d.%m.%Y %H:%M"])
 def test_a_time_in_another_form_is_named(tmp_path: Path, form: str) -> None:
     stamps = pd.Series(
         pd.Timestamp("2024-04-13 10:00") + pd.to_timedelta(np.arange(ROWS), unit="min")

@@ -102,6 +102,7 @@ def test_https_by_a_certificate_and_a_line_for_each_write(
             wrong = urllib.request.Request(f"{place}api/nothing", method="POST", data=b"")
             with pytest.raises(urllib.error.HTTPError) as refused:
                 urllib.request.urlopen(wrong, context=trusted, timeout=60)
+            refused.value.close()
         finally:
             process.terminate()
             process.wait(60)
