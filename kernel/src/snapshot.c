@@ -4,7 +4,7 @@
 #include "fields.h"
 #include <limits.h>
 
-#define TG_SNAPSHOT_VERSION 21u
+#define TG_SNAPSHOT_VERSION 22u
 
 typedef struct {
     char magic[8];

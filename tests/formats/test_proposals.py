@@ -185,6 +185,24 @@ def test_the_torque_of_an_axle_is_no_wheels_and_comes_with_its_line(name: str, e
     assert any(entry in note for note in result.left_out)
 
 
+def test_axles_are_counted_from_the_first_number_in_the_log() -> None:
+    """axle0 and axle1: the second's torque was given to the front wheels, and the first left out without a word."""
+    result = _propose({"speed_mps": SPEED, "axle0_torque": 90 + SPEED, "axle1_torque": 100 + SPEED})
+    shown = [note for note in result.left_out if "torque of an axle" in note]
+    assert ["drive_torque_1l: {from: axle0" in shown[0], "drive_torque_2l: {from: axle1" in shown[1]] == [
+        True,
+        True,
+    ]
+
+
+def test_a_name_that_ends_in_e7_by_chance_is_in_degrees() -> None:
+    names = {
+        f"{name}_node7": values
+        for name, values in zip(("latitude", "longitude"), _place().values(), strict=True)
+    }
+    assert {"latitude", "longitude"} <= set(_propose({"speed": SPEED, **names}))
+
+
 def test_degrees_and_minutes_are_no_degrees() -> None:
     place = {name: 100 * np.floor(v) + 60 * (v % 1) for name, v in _place().items()}
     result = _propose({"speed": SPEED, **place})

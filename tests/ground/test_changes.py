@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from itertools import combinations
@@ -146,12 +147,15 @@ def test_a_change_is_told_soon_and_once():
 
 
 def test_block_by_block_and_with_a_break_it_tells_the_same():
-    blocks = estimates_blocks(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]))
-    whole = OnlineChanges().update(blocks)
-    first = OnlineChanges()
+    blocks = estimates_blocks(
+        thinned(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]), 4)
+    )  # no roughness
+    settings = OnlineSettings(step=1.0)  # a step of some blocks, of which the break leaves some pending
+    whole = OnlineChanges(settings).update(blocks)
+    first = OnlineChanges(settings)
     result = [reported for k in range(50) for reported in first.update(blocks[k : k + 1])]
-    second = OnlineChanges()
-    second.restore(first.to_dict())
+    second = OnlineChanges(settings)
+    second.restore(json.loads(json.dumps(first.to_dict(), allow_nan=False)))
     result += second.update(blocks[50:])
     assert result == whole
     assert len(whole) == 1

@@ -231,7 +231,7 @@ def test_a_drawbar_force_of_one_value_is_named() -> None:
     notes = notes_on(
         {**columns, "drawbar_force": np.full(len(columns["time"]), 40.0)}, machine(hitch_height=0.3)
     )
-    assert "drawbar_force is 40 N in all rows, which no cell reads" in notes
+    assert "drawbar_force is 40 N in all rows: a cell's zero with nothing towed" in notes
 
 
 @pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])

@@ -140,11 +140,15 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: has no value"),
         (
             lambda c: {**c, "latitude": np.round(48e7 + 30 * c["time"])},
-            "column latitude: is 480000000, and none of its values is a latitude in degrees; give it in degrees: whole numbers of 1e-7",
+            "column latitude: is 480000000, and most of its values are no latitude in degrees; give it in degrees: whole numbers of 1e-7",
+        ),
+        (
+            lambda c: {**c, "latitude": np.where(c["time"] < 5, 0, np.round(48e7 + 30 * c["time"]))},  # no fix yet
+            "column latitude: is 48000",
         ),
         (
             lambda c: {**c, "longitude": 1130.02 + 1e-4 * c["time"]},
-            "column longitude: is 1130.02, and none of its values is a longitude in degrees; give it in degrees: degrees and minutes",
+            "column longitude: is 1130.02, and most of its values are no longitude in degrees; give it in degrees: degrees and minutes",
         ),
         (lambda c: {k: v[:0] for k, v in c.items()}, "the table is empty"),
         (lambda c: {}, "there are no columns"),

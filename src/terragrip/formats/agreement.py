@@ -23,7 +23,7 @@ from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
 _KNOWN = ("Terragrip", "a signal")
-_E7 = re.compile(r"e-?7\W*$", re.IGNORECASE)
+_E7 = re.compile(r"(?:^|[\W_\d]|lat|lon|lng|itude|deg)e-?7\W*$", re.IGNORECASE)
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from terragrip.units import factor_to
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
-_AXLE = frozenset({"axle", "achse", "vorderachse", "hinterachse", "essieu", "eje", "assale"})
+_NUMBER = re.compile(r"(?:axle|achse|essieu|eje|assale)[\W_]*(\d)", re.IGNORECASE)
 _ENDS = {"front": "f", "rear": "r", "middle": "m"}
 
 
@@ -24,15 +25,23 @@ def is_of_an_axle(column: Column) -> bool:
         or name.has("other", "command", "statistic")
     ):
         return False
-    return (not name.wheel and name.has(*_ENDS)) or (
-        not _AXLE.isdisjoint(name.words) and name.wheel.isdigit()
-    )
+    if name.wheel.isdigit() or not name.wheel:
+        return name.has(*_ENDS) or _number(column) is not None
+    return False
+
+
+def _number(column: Column) -> int | None:
+    """The number of the axle that a column names."""
+    found = _NUMBER.search(column.column)
+    return int(found[1]) if found else None
 
 
 def axle_torque_hints(columns: Iterable[Column], vehicle: Vehicle | None) -> Iterator[str]:
     """For each column that is the torque of an axle, how to give it to its wheels: those of the ``vehicle``, where it is known."""
-    for column in filter(is_of_an_axle, columns):
-        wheels = _wheels_of(column, vehicle)
+    of_axles = list(filter(is_of_an_axle, columns))
+    first = min((number for number in map(_number, of_axles) if number is not None), default=1)
+    for column in of_axles:
+        wheels = _wheels_of(column, vehicle, min(first, 1))
         ratio = " times the gear ratio" if column.name.has("motor") else ""
         own = column.unit is None or factor_to(column.unit, "N m") == 1.0
         unit = "" if own else f", unit: {column.unit}"
@@ -46,15 +55,17 @@ def axle_torque_hints(columns: Iterable[Column], vehicle: Vehicle | None) -> Ite
         )
 
 
-def _wheels_of(column: Column, vehicle: Vehicle | None) -> tuple[str, ...]:
-    """The wheels of the axle that a column names: of a vehicle by the axle's name or place, else the usual names."""
+def _wheels_of(column: Column, vehicle: Vehicle | None, first: int) -> tuple[str, ...]:
+    """The wheels of the axle that a column names: of a vehicle by the axle's name or place, else the usual names. ``first``: 0 or 1, the
+    number of the foremost axle."""
     end = next((end for end in _ENDS if column.name.has(end)), "")
+    number = (_number(column) or first) - first
     if vehicle is None:
-        letter = _ENDS.get(end, column.name.wheel)
+        letter = _ENDS.get(end, str(number + 1))
         return f"{letter}l", f"{letter}r"
     axles = list(vehicle.axles.items())
     place = {"front": 0, "rear": -1, "middle": len(axles) // 2}.get(end)
     if place is None:
-        place = min(int(column.name.wheel), len(axles)) - 1
+        place = min(number, len(axles) - 1)
     named = [axle for name, axle in axles if end and end in name.lower()]
     return tuple((named or [axles[place][1]])[0].wheels)

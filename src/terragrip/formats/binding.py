@@ -97,6 +97,13 @@ def _bound(origin: Source, log: LogTable) -> Source | None:
                 return None
             update[key] = tuple(columns)
             if key == "sum_of":
+                if len(set(columns)) < len(columns):
+                    twice = next(c for c in columns if columns.count(c) > 1)
+                    raise InputError(
+                        f"names the column {twice} twice",
+                        place="sum_of",
+                        hint="give each column a name of its own",
+                    )
                 update[key] = dict(zip(columns, names.values(), strict=True))
     bound_one = origin.model_copy(update=update)
     return bound_one if all(column in log.columns for column in bound_one.columns) else None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from terragrip.arrays import Floats
@@ -74,15 +75,14 @@ class OnlineChanges:
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain values, exact."""
-        begin = [None if np.isnan(x) else float(x) for x in self._begin]
         pending = self._pending
         return {
             **{name: getattr(self, name).tolist() for name in (*_RUNS, *_EACH)},
-            "_begin": begin,
-            "signals": [[None if np.isnan(x) else x for x in row] for row in self._signals.tolist()],
+            "_begin": _plain(self._begin),
+            "signals": _plain(self._signals),
             "travelled": self._travelled,
             "quiet": self._quiet,
-            "pending": None if pending is None else {k: v.tolist() for k, v in vars(pending).items()},
+            "pending": None if pending is None else {k: _plain(v) for k, v in vars(pending).items()},
             "from": self._from,
             "probability": self.probability,
         }
@@ -94,8 +94,12 @@ class OnlineChanges:
         self._signals = np.array(state["signals"], dtype=float).reshape(-1, len(self.settings.names))
         self._prior()
         self._travelled, self.probability = state["travelled"], float(state["probability"])
-        self._quiet, self._from, pending = int(state["quiet"]), state["from"], state["pending"]
-        self._pending = None if pending is None else Blocks(**{k: np.array(v) for k, v in pending.items()})
+        self._quiet, self._from = int(state["quiet"]), state["from"]
+        pending: dict[str, Any] | None = state["pending"]
+        if pending is not None:
+            counts = ("number", "rows", "usable", "streak")
+            pending = {k: np.array(v, dtype=np.int64 if k in counts else float) for k, v in pending.items()}
+        self._pending = None if pending is None else Blocks(**pending)
 
     def _prior(self) -> None:
         """The law of a new ground, by the noise of the steps so far."""
@@ -157,3 +161,10 @@ class OnlineChanges:
         took = now - float(self._begin[-1])
         std = float(np.sqrt((weight * (at - time) ** 2).sum() + took**2 / 12))
         return Change(time, std, self.probability, reported=now)
+
+
+def _plain(values: NDArray[Any]) -> list[Any]:
+    """An array as JSON has it: NaN is null."""
+    out = values.astype(object)
+    out[~np.isfinite(values)] = None
+    return list(out.tolist())

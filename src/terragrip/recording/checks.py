@@ -243,17 +243,16 @@ PLACES = {"latitude": 90.0, "longitude": 180.0}
 
 
 def refuse_place(name: str, values: Floats, source: str | None, channel: str | None = None) -> None:
-    """Raise InputError where values (n,) of a latitude or longitude change, and none is one in degrees; ``channel``: where ``name`` is the
-    column of another."""
-    limit, known = PLACES.get(channel or name), np.abs(values[np.isfinite(values)])
-    if limit is None or not len(known) or known.min() <= limit or not np.ptp(values[np.isfinite(values)]):
+    """Raise InputError where values (n,) of a latitude or longitude change, and most are none in degrees (0 stands for no fix);
+    ``channel``: where ``name`` is the column of another."""
+    limit, places = PLACES.get(channel or name), values[np.isfinite(values) & (values != 0)]
+    if limit is None or not len(places) or np.median(np.abs(places)) <= limit or not np.ptp(places):
         return
+    known = np.abs(places)
     hint = "give it in degrees: whole numbers of 1e-7 degrees by 'scale: 1e-7' in a profile"
     if not np.all(known == np.round(known)) and known.max() < 100 * limit:
         hint = "give it in degrees: degrees and minutes (ddmm.mmmm) as dd + mm.mmmm/60"
-    problem = (
-        f"is {values[np.isfinite(values)][0]:.10g}, and none of its values is a {channel or name} in degrees"
-    )
+    problem = f"is {places[0]:.10g}, and most of its values are no {channel or name} in degrees"
     raise InputError(problem, file=source, place=f"column {name}", hint=hint, page="formats#in-a-profile")
 
 

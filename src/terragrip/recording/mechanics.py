@@ -346,8 +346,8 @@ def _silent_cell(recording: Recording, vehicle: Vehicle) -> list[str]:
     value = float(pull[np.isfinite(pull)][0])
     if value:
         return [
-            f"drawbar_force is {value:.4g} N in all rows, which no cell reads: what the tool pulls beyond that is taken for soil "
-            "resistance. Leave the column out, if nothing measured it."
+            f"drawbar_force is {value:.4g} N in all rows: a cell's zero with nothing towed, which 'terragrip calibrate' finds, or one that "
+            "is not connected, and then what a tool pulls is taken for soil resistance: leave the column out."
         ]
     if not (any(stated) or vehicle.calibration.drawbar_offset):
         return []
@@ -391,7 +391,8 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         if still and (len(still) < len(held) or lost):
             shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
             verb = "change" if len(still) > 1 else "changes"
+            else_ = ", or the vehicle only coasts or is towed" if lost and len(still) == len(held) else ""
             notes.append(
-                f"{shown} never {verb} while the vehicle drives: the sensor is dead, or the column is wrong."
+                f"{shown} never {verb} while the vehicle drives: the sensor is dead, or the column is wrong{else_}."
             )
     return notes

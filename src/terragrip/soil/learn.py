@@ -71,7 +71,8 @@ class RunPairs:
             sums = np.cumsum([known * step, np.where(known, values.reshape(-1, rows), 0.0) * step], axis=-1)
             sums = np.concatenate((np.zeros((*sums.shape[:2], 1)), sums), axis=-1)
             way, total = sums[..., last] - sums[..., first]
-            return np.where(known & (way > 0), total / np.where(way > 0, way, 1.0), np.nan).ravel()
+            own = values.reshape(-1, rows)
+            return np.where(known & (way > 0), total / np.where(way > 0, way, 1.0), own).ravel()
 
         share = ALIKE + (1 - ALIKE) / np.tile(last - first, self.slip.size // rows)
         slip, adhesion, pull = (mean(values) for values in (self.slip, self.adhesion, self.pull))
