@@ -201,7 +201,8 @@ class Driveline(Part):
     """From the engine to the driven wheels, for machines that report the engine's torque and not the wheels' (docs/vehicle.md).
 
     Wheel torque = ``efficiency`` x ratio x (engine torque - ``accessory_power``/engine speed - ``engine_inertia`` x its
-    acceleration), summed over the driven wheels. The ratio is ``ratio`` where the gear is fixed, else engine speed over wheel
+    acceleration), summed over the driven wheels. While a PTO turns ``pto_power`` is taken as well; None: such rows
+    have no torque. The ratio is ``ratio`` where the gear is fixed, else engine speed over wheel
     speed. Each ``_std`` is the standard deviation of an unknown constant.
     """
 
@@ -209,6 +210,8 @@ class Driveline(Part):
     efficiency_std: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.05
     accessory_power: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))]
     accessory_power_std: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))] | None = None
+    pto_power: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))] | None = None
+    pto_power_std: Annotated[float, *quantity_of("W", 0, 1e6, likely=("kW",))] | None = None
     engine_torque_std: Annotated[float, *quantity_of("N m", 0, 1e5)] | None = None
     reference_torque: Annotated[float, *quantity_of("N m", 0, 1e5, above=True)] | None = None
     engine_inertia: Annotated[float, *quantity_of("kg m^2", 0, 1e3)] = 0.0

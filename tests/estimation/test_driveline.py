@@ -152,6 +152,24 @@ def test_a_gear_shift_is_set_aside(tractor: tg.Vehicle) -> None:
     assert estimates["adhesion_driven"][-1] == pytest.approx(39100 / 6000 / 9.80665, rel=5e-3)
 
 
+def test_what_a_pto_takes_does_not_pull(tractor: tg.Vehicle) -> None:
+    """60 kW more at the flywheel from 30 s on, all for the PTO: adhesion as before; none where the file does not give the power."""
+    log = steady()
+    turns = log.time > 30.0
+    more = log["engine_torque"] + np.where(turns, 60e3 / log["engine_speed"], 0.0)
+    baling = log.with_channels(engine_torque=more, pto_speed=np.where(turns, 56.5, 0.0))
+    unknown = tg.estimate(baling, tractor)
+    assert np.isnan(unknown["adhesion_driven"][turns]).all()
+    assert np.isfinite(unknown["adhesion_driven"][5:][~turns[5:]]).all()
+    assert np.isfinite(unknown["slip_driven"][-1])
+    assert any("The PTO turns in 50% of the log" in note for note in unknown.notes)
+    data = tractor.to_dict()
+    data["driveline"] |= {"pto_power": "60 kW", "pto_power_std": "10 kW"}
+    known = tg.estimate(baling, tg.Vehicle.from_dict(data))
+    assert known["adhesion_driven"][-1] == pytest.approx(39100 / 6000 / 9.80665, rel=5e-3)
+    assert known["adhesion_driven_std"][-1] > 1.5 * known["adhesion_driven_std"][290]
+
+
 def test_a_share_needs_its_reference(tractor: tg.Vehicle) -> None:
     log = steady()
     channels = {n: v for n, v in log.channels.items() if n != "engine_torque"}

@@ -27,7 +27,7 @@ def test_what_is_left_for_the_gears() -> None:
         np.array([400.0, 400.0, 400.0]),
         np.array([150.0, 0.0, 0.5]),
         np.array([4.0, 4.0, 0.0]),
-        accessory_power=9000.0,
+        other_power=np.array(9000.0),
         engine_inertia=1.5,
     )
     assert left[0] == pytest.approx(334.0)

@@ -7,7 +7,7 @@ The driven wheels become one wheel, ``driven``, and the free ones another, ``und
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +18,7 @@ from terragrip.estimation.engine_torque import (
     DrivelineTorque,
     EngineTorque,
     driveline_torque,
+    pto_turns,
 )
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.rims import DRIVE, Rim, rims_of, speeds_alone
@@ -35,6 +36,10 @@ _LEAST = 0.02  # as the kernel: an adhesion below it divides nothing
 _NOTE = (
     "The drive torque is the engine's through the driveline: adhesion_driven, net_traction_driven and efficiency_driven are of all driven "
     "wheels together; the adhesion of single wheels is not determined. Rows without a torque (standstill, gear shifts) hold none."
+)
+_PTO = (
+    "The PTO turns in {:.0%} of the log. What it takes of the engine's torque is not known, so these rows hold no adhesion and no soil "
+    "resistance: give 'pto_power: 40 kW' (and pto_power_std) under 'driveline'."
 )
 _TOWING = (
     "There is no drawbar_force: the pull of a tool is part of soil_resistance, "
@@ -70,6 +75,9 @@ class DrivenMachine:
             None if measured is None else float(np.nanmedian(measured)),
             source=whole.source,
         )
+        turning = pto_turns(whole.time, whole.channels)
+        if vehicle.driveline.pto_power is None and turning.any():
+            engine = replace(engine, notes=(*engine.notes, _PTO.format(turning.mean())))
         return cls(vehicle, tuple(whole.channels), engine, _drive(reference.rims), reference.dead_band)
 
     @classmethod
@@ -222,7 +230,7 @@ def machine_of(estimates: Estimates, vehicle: Vehicle) -> Vehicle:
     return Vehicle.from_dict(lumped(vehicle, (made.radii[DRIVEN], made.uncertainty.wheel_radius or 0.0)))
 
 
-_REPLACED = ("wheel_speed_", "wheel_based_speed", "vertical_load_", "engine_")
+_REPLACED = ("wheel_speed_", "wheel_based_speed", "vertical_load_", "engine_", "pto_")
 
 
 def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]:

@@ -25,6 +25,7 @@ _SHIFT = (
 _SLOWEST = 0.07  # of √(g r): slower rims do not determine the ratio
 SHARE_STD = 0.02
 """SD of a controller's torque, which is a model's, of the reference torque."""
+_TURNING = 1.0  # rad/s (10 rpm): a PTO that turns
 _FRICTION = (0.08, 0.04)  # of the reference torque, where the bus does not state it (ours)
 
 
@@ -96,8 +97,8 @@ class EngineTorque:
 
 @dataclass(frozen=True)
 class DrivelineTorque:
-    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside; ``std`` (n,) [N m]
-    of the value in that row, NaN where there is none; ``shift`` (n,): rows of a gear shift."""
+    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside (``shift``, a PTO of
+    unknown power); ``std`` (n,) [N m] of the value in that row, NaN where there is none; ``shift`` (n,): rows of a gear shift."""
 
     torque: Floats
     std: Floats
@@ -128,20 +129,38 @@ def driveline_torque(
     acceleration = (speed - earlier(time, speed, _LAGS[0])) / (
         time - earlier(time, np.where(np.isfinite(speed), time, np.nan), _LAGS[0])
     )
+    power, power_std = _taken(driveline, pto_turns(time, channels))
     into = torque_into_gears(
         engine.at(channels, time),
         speed,
         np.nan_to_num(acceleration),
-        accessory_power=driveline.accessory_power,
+        other_power=power,
         engine_inertia=driveline.engine_inertia,
     )
     torque = np.where(shift, np.nan, wheel_torque(into, ratio, driveline.efficiency))
-    power_std = driveline.accessory_power_std
-    if power_std is None:
-        power_std = driveline.accessory_power / 2
     std = torque_spread(speed, ratio, driveline.efficiency, engine.std, power_std)
     std_held = held(time, np.where(np.isfinite(torque), std, np.nan))
-    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio), np.nan, std_held), shift)
+    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio + power), np.nan, std_held), shift)
+
+
+def pto_turns(time: Floats, channels: Mapping[str, Floats]) -> Bools:
+    """Rows (n,) in which a power take-off turns; none where no channel says so."""
+    if "pto_speed" not in channels:
+        return np.zeros(len(time), dtype=bool)
+    turns: Bools = np.abs(held(time, channels["pto_speed"])) > _TURNING
+    return turns
+
+
+def _taken(driveline: Driveline, turns: Bools) -> tuple[Floats, Floats]:
+    """Power (n,) [W] that does not go into the gears, and its SD: the accessories', and the PTO's where it ``turns`` (NaN: not known)."""
+
+    def spread(power: float, std: float | None) -> float:
+        return power / 2 if std is None else std
+
+    pto = np.nan if driveline.pto_power is None else driveline.pto_power
+    power = driveline.accessory_power + np.where(turns, pto, 0.0)
+    own = spread(driveline.accessory_power, driveline.accessory_power_std)
+    return power, np.hypot(own, np.where(turns, spread(pto, driveline.pto_power_std), 0.0))
 
 
 def held(time: Floats, values: Floats) -> Floats:

@@ -50,7 +50,9 @@ class Options:
         if vehicle.driveline is None or decoder.profile is None:
             return decoder.channels
         had = () if self.driveline is None else self.driveline["channels"]
-        more = (name for name in decoder.profile.channels if name.startswith("engine_") or name in had)
+        more = (
+            name for name in decoder.profile.channels if name.startswith(("engine_", "pto_")) or name in had
+        )
         return tuple(dict.fromkeys((*decoder.channels, *more)))
 
     def core(

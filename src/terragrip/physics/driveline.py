@@ -21,22 +21,22 @@ def torque_into_gears(
     engine_speed: Floats,
     engine_acceleration: Floats,
     *,
-    accessory_power: float,
+    other_power: Floats,
     engine_inertia: float,
 ) -> Floats:
-    """Torque (n,) [N m] left for the gears: the engine's, less that of accessories and of its own acceleration (n,) [rad/s²].
+    """Torque (n,) [N m] left for the gears: the engine's, less that of what else it drives and of its own acceleration (n,) [rad/s²].
 
-    ``accessory_power`` [W] is divided by ``engine_speed`` (n,) [rad/s], NaN where that is not positive.
+    ``other_power`` (n,) [W], of accessories and a PTO, is divided by ``engine_speed`` (n,) [rad/s], NaN where that is not positive.
     """
     speed = np.where(engine_speed > 0, engine_speed, np.nan)
-    left: Floats = engine_torque - accessory_power / speed - engine_inertia * engine_acceleration
+    left: Floats = engine_torque - other_power / speed - engine_inertia * engine_acceleration
     return left
 
 
 def torque_spread(
-    engine_speed: Floats, ratio: Floats, efficiency: float, torque_std: float, power_std: float
+    engine_speed: Floats, ratio: Floats, efficiency: float, torque_std: float, power_std: Floats
 ) -> Floats:
-    """SD (n,) [N m] of the sum of wheel torques by the engine torque's [N m] and the accessories' [W], taken as constants."""
+    """SD (n,) [N m] of the sum of wheel torques by the engine torque's [N m] and by ``power_std`` (n,) [W] of the rest: constants."""
     speed = np.where(engine_speed > 0, engine_speed, np.nan)
     spread: Floats = efficiency * np.abs(ratio) * np.hypot(torque_std, power_std / speed)
     return spread
