@@ -32,6 +32,20 @@ def test_it_says_and_writes_the_same_best_slip(folder, capsys):
     assert best["interval"][0] < best["slip"] < best["interval"][1]
 
 
+def test_a_pull_that_nothing_measured_gives_no_advice_on_load(folder, capsys):
+    estimates = drive()
+    advised = {}
+    for channels in (["ground_speed", "drawbar_force"], ["ground_speed"]):
+        estimates.about["settings"] = {"channels": channels}
+        estimates.write("one.parquet")
+        called(capsys, "one.parquet", "--vehicle", "v.yaml", "-o", "advice.json")
+        advised[len(channels)] = json.loads((folder / "advice.json").read_text())
+    assert advised[1]["best_efficiency"] == advised[2]["best_efficiency"]
+    assert advised[2]["actions"]
+    assert advised[1]["actions"] == advised[1]["limits"] == []
+    assert "no drawbar_force was in the log" in advised[1]["missing"][0]
+
+
 def test_a_library_among_the_estimates_is_refused_with_its_option(folder, capsys):
     (folder / "soils.json").write_text('{"soils": {}}')
     code, _, error = called(capsys, "drive.parquet", "soils.json", "--vehicle", "v.yaml")

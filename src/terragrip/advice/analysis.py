@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,6 +30,11 @@ WIDEST_POWER = 0.24
 FARTHEST = 2.0
 """A best slip beyond this many times the data's reach rests on what soils are like in general, which is said."""
 FRONT_POINTS = 21
+NO_PULL = (
+    "no drawbar_force was in the log: the best slip is that of a machine which tows nothing. The pull of a tool counts here as soil "
+    "resistance, and the best slip with it is another: measure the pull for advice on load, ballast and speed"
+)
+"""Of drives whose pull no sensor measured."""
 CURVE_END, CURVE_POINTS = 0.4, 41
 
 
@@ -114,6 +120,8 @@ def _of_soil(
             f"soil resistance is {drive['soil_resistance']:.3f} in the mean, and no ground pushes: the torques' scale, the drawbar's "
             "zero or a slope is off, and every efficiency here is too high; calibrate, and drive the same way back too",
         )
+    if not samples.towed:
+        missing.insert(0, NO_PULL)
     if beyond:
         missing.append(
             f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
@@ -134,13 +142,14 @@ def _of_soil(
     slip, pull = samples.levels()
     fuel = _burnt(samples, vehicle)
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
-    return Advice(
+    advice = Advice(
         name, best,
         power if power.interval[1] - power.interval[0] <= WIDEST_POWER and not beyond else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
         _reserve(samples, curves, wheels), {**_field_work(work, vehicle), **fuel}, _limits(work, drive), _curve(over),
     )  # fmt: skip
+    return advice if samples.towed else replace(advice, actions=(), drive=drive, field_work=fuel, limits=())
 
 
 def _known(best: Best, over: OverSlip) -> bool:

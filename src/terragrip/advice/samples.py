@@ -27,6 +27,7 @@ class Samples:
     less all resistances; ``metres`` of way that each stands for; ``stretch``: run and `RADII` wheel radii of it; ``speed`` [m/s];
     ``slip_std``, ``adhesion_std``, ``resistance_std``: the estimates' own SD; ``wheel_adhesion``
     (rows, driven wheels); ``fuel`` [m³/s], NaN where not measured. ``driven``: the driven wheels' share of the weight, the mean.
+    ``towed``: a drawbar force was in every log; without, a tool's pull is part of ``resistance``.
     """
 
     slip: Floats
@@ -42,6 +43,7 @@ class Samples:
     wheel_adhesion: Floats
     fuel: Floats
     driven: float
+    towed: bool
 
     def levels(self, count: int = 12) -> tuple[Floats, Floats]:
         """(slip, pull): means (count,) over equal ways from the lowest pull to the highest."""
@@ -133,6 +135,8 @@ def _of_table(
     stretch = number * 1_000_000 + np.floor(np.nan_to_num(distance) / length).astype(np.int64)
     each = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
     fuel = fuel_rate_of(estimates)
+    channels = estimates.about.get("settings", {}).get("channels")
+    towed = not channels or "drawbar_force" in channels
     slip_std, adhesion_std = mean("slip_{}_std"), mean("adhesion_{}_std")
     for name in sorted(set(labels[good])):
         rows = good & (labels == name)
@@ -141,15 +145,17 @@ def _of_table(
             Samples(
                 slip[rows], adhesion[rows], resistance[rows], pull[rows], metres[rows], stretch[rows],
                 np.asarray(estimates["ground_speed"])[rows], slip_std[rows], adhesion_std[rows],
-                np.asarray(estimates["soil_resistance_std"])[rows], each[rows], fuel[rows], float(driven[rows].mean()),
+                np.asarray(estimates["soil_resistance_std"])[rows], each[rows], fuel[rows], float(driven[rows].mean()), towed,
             ),
         )  # fmt: skip
 
 
 def _joined(parts: Sequence[Samples]) -> Samples:
-    columns = [name for name in Samples.__dataclass_fields__ if name != "driven"]
+    columns = [name for name in Samples.__dataclass_fields__ if name not in ("driven", "towed")]
     way = [part.way for part in parts]
     driven = float(np.average([part.driven for part in parts], weights=way))
     return Samples(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}, driven=driven
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns},
+        driven=driven,
+        towed=all(part.towed for part in parts),
     )
