@@ -39,7 +39,7 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "psi": (0.45359237 * STANDARD_GRAVITY / 0.0254**2, (1, -1, -2, 0)),
     "rad": (1.0, _ONE), "mrad": (1e-3, _ONE), "deg": (math.pi / 180, _ONE), "degree": (math.pi / 180, _ONE),
     "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "Grad": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
-    "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "1": (1.0, _ONE),
+    "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "‰": (1e-3, _ONE), "1": (1.0, _ONE),
     "rpm": (2 * math.pi / 60, (0, 0, -1, 0)), "rps": (2 * math.pi, (0, 0, -1, 0)),
     "kmh": (1 / 3.6, (0, 1, -1, 0)), "kph": (1 / 3.6, (0, 1, -1, 0)), "kmph": (1 / 3.6, (0, 1, -1, 0)), "mph": (0.44704, (0, 1, -1, 0)),
     "knot": (1852 / 3600, (0, 1, -1, 0)), "knots": (1852 / 3600, (0, 1, -1, 0)), "kn": (1852 / 3600, (0, 1, -1, 0)),
@@ -61,7 +61,7 @@ _OF_TURNS = re.compile(r"\s*(?:[kM]?(?:Hz|hertz)|1\s*/\s*s(?:ec)?|s\s*\^?\s*-\s*
 _GRAVITY = (0, 1, -2, 0)
 _POWER = re.compile(r"(?<=[a-z°])(-[1-4]|[234])(?![\d.])")
 """``m/s2``, ``m s-1``: an exponent without its sign of a power."""
-_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%°µ][A-Za-z0-9_%°µ]*|1))")
+_TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%‰°µ][A-Za-z0-9_%‰°µ]*|1))")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$", re.DOTALL)
 _COMMA = re.compile(r"\s*[+-]?\d+,(?:\d{1,2}|\d{4,})(?:\s*[^\d\s,.][^,]*)?\s*")
 """A decimal comma; three digits behind it may be thousands."""

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.formats import inspect, read
+from terragrip.formats.proposal import missing_channels
 from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.vehicle_maker import make
@@ -500,6 +501,15 @@ def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newto
         ("M_Brems_VL [Nm]", None),
         ("Längsbeschleunigung [m/s²]", "acceleration_x"),
         ("Querneigung [°]", "roll"),
+        ("Steigung [‰]", "pitch"),
+        ("RoadSlope [%]", "pitch"),
+        ("side_slope [deg]", None),
+        ("GrossMass [kg]", "mass"),
+        ("Bunkergewicht [t]", None),
+        ("Hakenkraft [kN]", "drawbar_force"),
+        ("GPS_Height [m]", "altitude"),
+        ("boom_height_m", None),
+        ("Hubwerkshöhe [cm]", None),
     ],
 )
 def test_names_of_others(name: str, channel: str | None) -> None:
@@ -600,3 +610,12 @@ def test_the_wheels_of_all_axles_are_proposed(speed: str, torque: str, wheels: d
     for column, wheel in wheels.items():
         assert proposals[f"wheel_speed_{wheel}"].entry["from"] == speed.format(column)
         assert proposals[f"drive_torque_{wheel}"].entry["from"] == torque.format(column)
+
+
+def test_motors_in_a_list_that_no_name_tells_apart_are_named() -> None:
+    """A message of one's own, MotorStatus[] motors: which is which only its writer knows."""
+    columns = [f"/motors/status.motors[{k}].{field}" for k in range(4) for field in ("rpm", "temp_fet", "id")]
+    said = missing_channels((), has_time=True, columns=columns)
+    (sentence,) = (s for s in said if "is not known" in s)
+    assert "/motors/status.motors[].rpm is not known" in sentence
+    assert 'wheel_speed_fl: {from: "/motors/status.motors[0].rpm"}' in sentence

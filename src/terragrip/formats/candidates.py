@@ -51,6 +51,7 @@ class Candidate:
 
 _WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "icp"})
 """Odometry by these does not look at the wheels; the profile ros2-4wd takes it for ground speed, too."""
+_SLOPES = frozenset({"slope", "incline", "inclination", "steigung", "pente", "pendiente", "pendenza"})
 _FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
 Hint = tuple[str, float, str]
 """What a name says of a column that may be a channel: the channel, the score, and why."""
@@ -203,8 +204,17 @@ def _of_motion(column: Column) -> list[Hint]:
         and not _in_turns(column.unit)
     ):
         return [("angular_velocity_z", 0.3, "turns, of an unknown part")]
-    if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position"):
-        return [("pitch" if name.has("pitch") else "roll", 0.85, "its name")]
+    if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position", "lateral"):
+        slope = bool(_SLOPES & set(name.words))
+        if slope and name.axis:
+            return []  # inclination_x: along it, or about it
+        return [
+            (
+                "pitch" if name.has("pitch") else "roll",
+                0.7 if slope else 0.85,
+                "a slope" if slope else "its name",
+            )
+        ]
     return []
 
 
@@ -216,12 +226,15 @@ def _of_place(column: Column) -> list[Hint]:
         if name.has(channel):
             whole = channel in name.words or channel[:3] in name.words
             return [(channel, 0.85 if whole else 0.75, "its name")]
-    if name.has("altitude"):
+    if name.has("altitude") and not name.has("coupling"):
         return [("altitude", 0.85, "its name")]
     if name.has("coupling") and name.has("vertical") and (name.has("force") or column.kind == "force"):
         return [("hitch_load", 0.75, "a vertical force at the hitch")]
     if name.has("mass") and not (
-        name.strange or name.wheel or name.has("wheel", "front", "rear", "motor", "coupling")
+        name.strange
+        or _is_compound(name)
+        or name.wheel
+        or name.has("wheel", "front", "rear", "motor", "coupling")
     ):
         return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
     words = set(name.words)
@@ -235,6 +248,11 @@ def _of_place(column: Column) -> list[Hint]:
     if ("f" in words or column.kind == "force") and (name.has("coupling") or words & {"tow", "draw"}):
         return [("drawbar_force", 0.65, "a force at the hitch, by its letter or unit")]
     return []
+
+
+def _is_compound(name: Name) -> bool:
+    """Whether a mass is of what the word begins with: Bunkergewicht."""
+    return any(re.fullmatch(r"(?!gesamt|fahrzeug).+(gewicht|masse)", word) for word in name.words)
 
 
 def _of_speed(column: Column) -> list[Hint]:
@@ -276,6 +294,8 @@ def _fits(kind: str, channel: str) -> bool:
         return kind in ("rotation", "speed")
     if channel.startswith("drive_torque_"):
         return kind in ("torque", "current", "share")
+    if channel == "pitch":
+        return kind in ("angle", "share")  # a grade
     if target == "force":
         return kind in ("force", "mass")
     return kind == target

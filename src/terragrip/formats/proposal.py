@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import yaml
 
 from terragrip.formats.recognition import Proposal
 from terragrip.formats.time_column import TimeColumn
+from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording import Recording
 from terragrip.recording.schema import has_engine_torque, has_torque, wheel_names_in
 
@@ -29,12 +31,17 @@ def missing_channels(
             "No wheel speed was found, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
             "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
-        matrices = dict.fromkeys(name.removesuffix("[1]") for name in columns if name.endswith("[1]"))
-        if matrices:
-            first = next(iter(matrices))
+        matrices = [name for name in columns if name.endswith("[1]")]
+        fields = [name for name in columns if re.search(r"\[1\]\.", name) and _may_turn(name)]
+        if matrices or fields:
+            several = (
+                *(name.removesuffix("[1]") for name in matrices),
+                *(n.replace("[1]", "[]") for n in fields),
+            )
+            first = next(iter((*matrices, *fields))).replace("[1]", "[0]")
             notes.append(
-                f"The order of the columns in {', '.join(matrices)} is not known: if they are the wheels', say which is which in a "
-                f"profile, 'wheel_speed_fl: {{from: \"{first}[0]\"}}'."
+                f"The order in {', '.join(several)} is not known: if they are the wheels', say which is which in a "
+                f"profile, 'wheel_speed_fl: {{from: \"{first}\"}}'."
             )
     if "ground_speed" not in proposals:
         notes.append("No ground speed was found: slip and resistance need it; positions will do.")
@@ -73,6 +80,11 @@ def missing_channels(
             "No pitch was found: the ground is assumed level, and a slope appears as soil resistance."
         )
     return notes
+
+
+def _may_turn(name: str) -> bool:
+    """Whether a column's name speaks of a speed, a torque or a current."""
+    return GENERAL.read(name).has("speed", "rotation", "torque", "current")
 
 
 def refusal(channels: Collection[str], silent: Sequence[str]) -> str:

@@ -23,7 +23,8 @@ MEANINGS: dict[str, str] = {
     "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
     "gyro": "gyroscope gyro gyr",
     "rate": "rate angular turn",
-    "pitch": "pitch assiette nick nickwinkel neigung tangage cabeceo beccheggio",
+    "pitch": "pitch assiette nick nickwinkel neigung tangage cabeceo beccheggio slope incline inclination steigung pente "
+    "pendiente pendenza",
     "roll": "roll bank wank wankwinkel querneigung roulis balanceo rollio",
     "yaw": "yaw psi gier lacet imbardata",
     "heading": "heading hdg course bearing azimuth cog compass",
@@ -32,7 +33,7 @@ MEANINGS: dict[str, str] = {
     "altitude": "altitude alt height elevation hoehe",
     "position": "position pose pos easting northing utm",
     "pull": "drawbar draft draught pull traction tractive zugkraft traino tiro trekkracht fdraw fzug ftow fpull",
-    "coupling": "hitch towing trailer attelage koppelpunkt",
+    "coupling": "hitch towing trailer attelage koppelpunkt hook haken deichsel coupler",
     "force": "force kraft fuerza forza",
     "mass": "mass weight masse gewicht poids peso massa",
     "distance": "distance odometer",
@@ -44,14 +45,15 @@ MEANINGS: dict[str, str] = {
     "motor": "motor moteur motore antrieb antriebs esc drive",
     "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",
-    "body": "vehicle machine car robot body base ego tractor fahrzeug fzg obd avancement",
+    "body": "vehicle machine car robot body base ego tractor gross gesamt fahrzeug fzg obd avancement",
     "odometry": "odom odometry",
     "soil": "soil terrain surface",
     "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
     "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
     "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
     "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel "
-    "getriebe rocker bogie suspension brems bremse bremsen frein freno",
+    "getriebe rocker bogie boom bucket header cutter cutterbar mast crane ride gestaenge ausleger schneidwerk hubwerk hubwerks hubhoehe "
+    "suspension brems bremse bremsen frein freno",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
