@@ -16,7 +16,8 @@ from scipy.stats import t as student
 
 from ground_drives import COARSE, FINE, GRASS, Ground, drive, thinned
 from terragrip.errors import InputError
-from terragrip.ground.changes import LEAST, _Cost, _pelt, changes_of
+from terragrip.ground import changes as changes_module
+from terragrip.ground.changes import LEAST, _borders, _Cost, changes_of
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of, usual_noise
 from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
@@ -61,7 +62,7 @@ def test_the_segmentation_is_the_best_of_all(seed):
         return cost.of(ends[:-1], ends[1:]).sum() + price * len(cuts)
 
     every = [c for k in range(6) for c in combinations(range(24), k) if (np.diff([0, *c, 24]) >= LEAST).all()]
-    assert tuple(_pelt(cost, price)) == min(every, key=total)
+    assert tuple(_borders(cost, price)) == min(every, key=total)
 
 
 def test_a_change_is_found_where_it_is():
@@ -211,6 +212,42 @@ def test_steps_are_means_of_their_blocks_however_they_come(cuts, length):
         pieces = joined(pieces, some)
     np.testing.assert_array_equal(pieces.resistance, whole.resistance)
     np.testing.assert_array_equal(pieces.start, whole.start)
+
+
+@pytest.mark.parametrize("one_ground", [10, 120])
+def test_a_long_drive_searched_in_pieces_has_the_changes_of_the_whole(monkeypatch, one_ground):
+    pieces = [("grass", GRASS, one_ground), ("fine", FINE, one_ground)] * (240 // one_ground)
+    blocks = estimates_blocks(drive(7, pieces))
+    whole = changes_of(blocks)
+    monkeypatch.setattr(changes_module, "_SEARCHED", 100)
+    assert changes_of(blocks) == whole
+    assert len(whole) == pytest.approx(480 / one_ground - 1, abs=2)
+
+
+def test_a_creep_before_a_standstill_is_no_change():
+    """As the vehicle rolls out slip is anything, and mu and rho_s with it."""
+    stop = Ground(0.2, 0.02, slip=0.02)
+    estimates = drive(8, [("fine", FINE, 40), ("stop", stop, 4), ("fine", FINE, 40)])
+    creeps = np.asarray(estimates["soil"]) == "stop"
+    stds = {
+        name: np.where(creeps, 0.4, 0.02)
+        for name in estimates.names
+        if name.startswith("slip_") and name.endswith("_std")
+    }
+    assert len(changes_of(estimates_blocks(estimates))) == 2
+    assert not changes_of(estimates_blocks(replace(estimates, columns={**estimates.columns, **stds})))
+
+
+def test_noise_in_slip_makes_no_scale():
+    """A pull that slips by 2 % on a usual curve, slip known to 4 %: what noise measures, more or less, tells nothing of the curve."""
+    blocks = estimates_blocks(drive(9, [("fine", FINE, 20)]))
+    rng = np.random.default_rng(9)
+    slip = 0.02 + 0.04 * rng.standard_normal(blocks.slip.shape)
+    usual = CURVES["exponential"].value(np.array([0.02]), {"a": 0.85})
+    made = replace(
+        blocks, slip=slip, slip_variance=np.full_like(slip, 0.04**2), adhesion=np.full_like(slip, usual)
+    )
+    assert not np.isfinite(signals_of(made, ("curve_scale",))).any()
 
 
 def test_short_and_empty_drives_have_none():

@@ -27,6 +27,8 @@ LEAST = 4
 """Fewest steps of a stretch."""
 _AT_ONCE = 512
 """Stretches that end at one block and are weighed together."""
+_SEARCHED = 2000
+"""Steps searched together, at least: ruptures' time grows with the square of a search's changes."""
 _SHIFT = 20.0
 """Moved from every stretch's cost into the penalty: the sum stays, and PELT's pruning, made for costs that no split raises, stays right."""
 
@@ -80,7 +82,7 @@ def changes_of(
     price = -2 * np.log(chance)
     noise = noise_of(signals, names)
     cost = _Cost(signals, Model.of(names, noise))
-    ends = [0, *_pelt(cost, price), len(signals)]
+    ends = [0, *_borders(cost, price), len(signals)]
     return tuple(
         _change(
             cost,
@@ -108,6 +110,7 @@ class _Cost:
         )
         self._model = model
         self.signal = signals
+        self.begin = 0
         self._end, self._costs = -1, np.zeros(0)
 
     def fit(self, signal: Any) -> _Cost:
@@ -115,9 +118,10 @@ class _Cost:
         return self
 
     def error(self, start: int, end: int) -> float:
-        """Cost of the stretch [start, end), less `_SHIFT`."""
+        """Cost of the stretch [start, end) from `begin`, less `_SHIFT`."""
+        start, end = self.begin + start, self.begin + end
         if end != self._end:
-            first = np.arange(max(end - _AT_ONCE, 0), end)
+            first = np.arange(max(end - _AT_ONCE, self.begin), end)
             self._end, self._costs = end, self.of(first, np.full(first.size, end))
         back = end - start
         if back > self._costs.size:
@@ -130,15 +134,32 @@ class _Cost:
         return -2 * self._model.evidence(count, total, square)
 
 
-def _pelt(cost: _Cost, price: float) -> list[int]:
+def _borders(cost: _Cost, price: float) -> list[int]:
+    """The steps before which the ground changes. A long drive is searched piece by piece, each from the last border that the piece before
+    found well before its end."""
+    borders: list[int] = []
+    steps, size = len(cost.signal), _SEARCHED
+    while True:
+        begin = borders[-1] if borders else 0
+        end = begin + size
+        found = _pelt(cost, begin, min(end, steps), price)
+        if end >= steps:
+            return borders + found
+        sure = [k for k in found if k <= end - _SEARCHED // 4]
+        borders += sure
+        size = _SEARCHED if sure else size + _SEARCHED
+
+
+def _pelt(cost: _Cost, begin: int, end: int, price: float) -> list[int]:
     try:
         from ruptures.detection.pelt import Pelt
     except ImportError:
         raise missing_package("ruptures", "ground", "find the changes of a whole drive") from None
+    cost.begin = begin
     search = Pelt(min_size=LEAST, jump=1)
     search.cost = cost
-    search.fit(cost.signal)
-    return [int(k) for k in search.predict(pen=price + _SHIFT)[:-1]]
+    search.fit(cost.signal[begin:end])
+    return [begin + int(k) for k in search.predict(pen=price + _SHIFT)[:-1]]
 
 
 def _change(

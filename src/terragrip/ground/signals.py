@@ -12,7 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.blocks import FLOOR, Blocks
+from terragrip.soil.blocks import FLOOR, LARGEST_SLIP, Blocks
 
 GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
 """The signals that depend on the ground only. `_sd`: ln of the SD within a block."""
@@ -23,8 +23,9 @@ SIGNALS = (
 
 _SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
 """Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
-_SHOWN = 0.5
+_SHOWN = 0.25
 """The scale counts from where slip and mu tell at least this much of it (inverse variance) beside what is known before."""
+_SLIPS = np.linspace(0, LARGEST_SLIP, 601)
 _OFFSET = 0.02
 """rho_s at which its errors (drawbar's zero, slope) are as much additive as the ground's variation is proportional."""
 
@@ -57,7 +58,10 @@ LAWS: dict[str, Law] = {
 
 
 def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
-    """Signals (blocks, names); NaN where a block shows nothing. Raises ValueError on a name that is none of `SIGNALS`."""
+    """Signals (blocks, names); NaN where a block shows nothing, or its slip is known to no better than 30 %.
+
+    Raises ValueError on a name that is none of `SIGNALS`.
+    """
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
         "soil_resistance": np.log(np.maximum(blocks.resistance, -_OFFSET / 2) + _OFFSET),
@@ -75,8 +79,10 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     for name in names:
         if name not in every:
             raise ValueError(f"there is no signal {name!r}; there are {', '.join(SIGNALS)}")
+    creeps = 2 * np.sqrt(blocks.slip_variance.mean(axis=1)) > LARGEST_SLIP  # as just before a standstill
+    shown = blocks.known & ~creeps
     out = np.column_stack([every[name] for name in names])
-    return np.asarray(np.where(blocks.known[:, None], out, np.nan))
+    return np.asarray(np.where(shown[:, None], out, np.nan))
 
 
 def _log_sd(variance: Floats) -> Floats:
@@ -84,11 +90,14 @@ def _log_sd(variance: Floats) -> Floats:
 
 
 def _log_scale(slip: Floats, adhesion: Floats, slip_variance: Floats) -> Floats:
-    """ln of the curve's scale, (blocks,); NaN where slip is too small beside its own error to show the curve."""
+    """ln of the curve's scale, (blocks,); NaN where slip is too small beside its own error to show the curve: the slip itself, and the
+    one that mu has on a usual curve, lest noise choose."""
     curve = CURVES["exponential"]
-    shape, slope = curve.value(slip, {"a": 1.0}), curve.slope(slip, {"a": 1.0})
-    variance = _ADHESION_SD**2 + (_SCALE * slope) ** 2 * slip_variance
-    shown = (_SCALE_SD * shape) ** 2 > _SHOWN * variance
+    usual = np.interp(np.abs(adhesion), curve.value(_SLIPS, {"a": _SCALE}), _SLIPS)
+    shown = slip * adhesion > 0
+    for one in (slip, usual):
+        variance = _ADHESION_SD**2 + curve.slope(one, {"a": _SCALE}) ** 2 * slip_variance
+        shown &= (_SCALE_SD * curve.value(one, {"a": 1.0})) ** 2 > _SHOWN * variance
     scale = np.maximum(curve_scale(slip, adhesion), 0.1 * _SCALE)
     return np.where(shown, np.log(scale), np.nan)
 
