@@ -46,6 +46,20 @@ def test_slip_that_grows_on_one_side_within_seconds_is_no_scale(columns: Columns
     assert not any("its scale changed" in note for note in notes(sound, tracked))
 
 
+def test_the_torques_of_a_bend_that_only_the_rims_show_have_no_other_scale(
+    columns: Columns, tracked: Vehicle
+) -> None:
+    """From 31 s on a bend to the left, without a gyroscope: the inner wheels are driven less, which is named only straight ahead."""
+    less = late(columns, 0.6, "drive_torque_fl", "drive_torque_rl")
+    assert sum("its scale changed" in note for note in notes(less, tracked)) == 2
+    turn = 0.1 * np.clip((columns["time"] - 30) / 2, 0, 1)
+    bend = {
+        f"wheel_speed_{w}": (1 - turn if w.endswith("l") else 1 + turn) * columns[f"wheel_speed_{w}"]
+        for w in tracked.wheels
+    }
+    assert not any("its scale changed" in note for note in notes(less | bend, tracked))
+
+
 def test_a_ground_speed_that_changes_beside_the_positions_is_named(
     columns: Columns, vehicle: Vehicle
 ) -> None:

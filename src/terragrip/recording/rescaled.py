@@ -43,6 +43,7 @@ def rescaled_warnings(
     rims = np.concatenate([axle.rims for axle in drive.axles])
     even = (np.abs(rims - drive.pace) < _EVEN * drive.pace).all(axis=0)
     rows = drive.straight & even
+    alike = rows if turn is not None else rows & np.all(drive.level, axis=0)
     for axle in drive.axles:
         others = [one for one in drive.axles if one is not axle]
         notes += _of_axle(
@@ -53,9 +54,11 @@ def rescaled_warnings(
             beside = [
                 one.pulls
                 for one in others
-                if one.pulls is not None and (one.pulls[:, rows & pulling] > 0).all()
+                if one.pulls is not None and (one.pulls[:, alike & pulling] > 0).all()
             ]
-            notes += _of_axle(recording, "drive_torque", axle, drive.when, axle.pulls, rows & pulling, beside)
+            notes += _of_axle(
+                recording, "drive_torque", axle, drive.when, axle.pulls, alike & pulling, beside
+            )
     return notes
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import longest
-from terragrip.recording.turns import straight_rows
+from terragrip.recording.turns import side_differences, straight_rows
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -102,14 +102,17 @@ def slower_warnings(
     recording: Recording, vehicle: Vehicle, means: Means | None, turn: Floats | None
 ) -> list[str]:
     """A sentence on rims that for a part of the drive go surely slower than their hubs while they pull; ``turn`` (n,) [rad/s]: by a
-    sensor, left positive. None: only straight ahead."""
+    sensor, left positive. None: straight ahead, and each hub may be slower by the turn that the rims of all axles show."""
     if means is None:
         return []
     when = recording.time[0] + (np.flatnonzero(means.rows) + 0.5) * means.length
     straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
-    yaw = np.zeros(len(when)) if turn is None else means.of(turn)
-    usable = straight if turn is None else np.isfinite(yaw)
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
+    if turn is None:
+        usable, slowed = straight, dict.fromkeys(sides, _inner(recording, vehicle, means))
+    else:
+        yaw = means.of(turn)
+        usable, slowed = np.isfinite(yaw), {wheel: yaw * side for wheel, side in sides.items()}
     least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     stated = vehicle.uncertainty.wheel_radius
     slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
@@ -119,7 +122,7 @@ def slower_warnings(
         if spin is None or torque is None:
             continue
         rim = radius * window_means(spin, means.place, means.count)[means.rows]
-        hub, thrust = means.speed - yaw * sides[wheel], means.of(torque) / radius
+        hub, thrust = means.speed - slowed[wheel], means.of(torque) / radius
         rows = (hub - rim > slower * hub) & (thrust > least) & usable
         stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
         if stretch:
@@ -136,3 +139,15 @@ def slower_warnings(
         f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
         f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
     ]
+
+
+def _inner(recording: Recording, vehicle: Vehicle, means: Means) -> Floats:
+    """By how much [m/s] the inner hubs may be slower than the vehicle in each window (n,): half of what the rims of left and right differ
+    by on the axle where they differ least, for a turn shows on every one."""
+    rims = {
+        wheel: radius * window_means(recording.channels[name], means.place, means.count)[means.rows]
+        for wheel, radius in vehicle.radii.items()
+        if (name := f"wheel_speed_{wheel}") in recording.channels
+    }
+    apart = [np.abs(one) / 2 for one in side_differences(vehicle, rims)]
+    return np.min(apart, axis=0) if apart else np.zeros(int(means.rows.sum()))

@@ -48,9 +48,8 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
         return [], []
     straight = drive.straight
     if turn is None:
-        level = [np.abs(np.diff(axle.rims, axis=0)[0]) < _STRAIGHT * drive.pace for axle in drive.axles]
-        rolling = _rolling_apart(drive.axles, straight, level)
-        straight &= np.all(level, axis=0)
+        rolling = _rolling_apart(drive.axles, straight, drive.level)
+        straight &= np.all(drive.level, axis=0)
     else:
         rolling = [note for axle in drive.axles for note in _rolling(axle, straight, _ROLL)]
     opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
@@ -119,6 +118,11 @@ class Drive:
     def straight(self) -> Bools:
         """Windows (n,) of driving straight ahead, by the turn."""
         return self.driving & (np.abs(self.hubs) < _STRAIGHT * self.pace)
+
+    @property
+    def level(self) -> list[Bools]:
+        """Of each axle, the windows (n,) in which its rims agree: where no sensor shows a turn, all of them do straight ahead."""
+        return [np.abs(np.diff(axle.rims, axis=0)[0]) < _STRAIGHT * self.pace for axle in self.axles]
 
     def contradicts(self, axle: Axle) -> bool:
         """Whether an axle's torques, apart from the part due to pace and pull, oppose the slips from side to side."""
