@@ -180,3 +180,30 @@ def test_a_fit_of_estimates_keeps_to_the_bounds_that_are_sent(client: TestClient
     refused = fit(client, **sent, bounds={"a": [2.0, 1.0]})
     assert refused.status_code == 422
     assert "bounds of a" in refused.json()["detail"]
+
+
+def test_a_dragged_handle_gives_a_curve_and_its_parameters(client: TestClient) -> None:
+    sent = {"model": "burckhardt", "parameters": {"c1": 0.8, "c2": 20.0, "c3": 0.2}}
+    (peak,) = [one for one in client.post("/api/curve", json=sent).json()["handles"] if one["name"] == "peak"]
+    goal = {"handle": "peak", "slip": peak["slip"] + 0.08, "value": peak["value"] - 0.1}
+    moved = client.post("/api/curve/move", json={**sent, **goal}).json()
+    np.testing.assert_allclose(moved["peak"], [goal["slip"], goal["value"]], atol=0.005)
+    assert moved["value"] == CURVES["burckhardt"].value(moved["slip"], moved["parameters"]).tolist()
+    assert (
+        moved["initial_slope"]
+        == moved["parameters"]["c1"] * moved["parameters"]["c2"] - moved["parameters"]["c3"]
+    )
+    held = client.post("/api/curve/move", json={**sent, **goal, "held": ["c1", "c2", "c3"]})
+    assert held.status_code == 422
+    assert client.post("/api/curve/move", json={**sent, **goal, "handle": "tail"}).status_code == 422
+
+
+def test_a_fit_from_here_begins_where_the_curve_was_dragged(client: TestClient) -> None:
+    """From a wheel numeric so high that these slips do not feel it, no step leads down: the fit's own starts are elsewhere."""
+    slip = np.linspace(0.3, 0.6, 30)
+    mu = CURVES["wismer_luth"].value(slip, {"wheel_numeric": 10.0})
+    sent = {"model": "wismer_luth", "bootstrap": 0, "slip": slip.tolist(), "adhesion": mu.tolist()}
+    for start, found in ((20.0, 10.0), (490.0, 490.0)):
+        result = fit(client, **sent, start={"wheel_numeric": start}).json()
+        assert result["parameters"]["wheel_numeric"] == pytest.approx(found, rel=1e-3)
+    assert fit(client, **sent, start={"zz": 1.0}).status_code == 422

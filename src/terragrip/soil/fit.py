@@ -54,6 +54,8 @@ class AdhesionCurve:
     common_sd : relative SD of an error of adhesion that all runs share (the machine's torque scale). Drawing runs does not show it, so it
         widens the intervals.
     common_slip_sd : SD of an error of slip that all pairs share (zero slip), likewise.
+    start : values of free parameters that the fit begins at, in place of the several starts that it tries itself; it then ends in the
+        minimum nearest to them, which may be another.
 
     After `fit`: `parameters_` (all of the model's, and intercept), `free_`, `interval_` {name: (low, high)}, `r2_`, `nrmse_`, `bins_`,
     `identifiability_`, `at_bound_` (free parameters that stopped at a bound: the bound gave the value, not the data, so the
@@ -73,6 +75,7 @@ class AdhesionCurve:
         common_sd: float = 0.0,
         bounds: Mapping[str, tuple[float, float]] | None = None,
         common_slip_sd: float = 0.0,
+        start: Mapping[str, float] | None = None,
     ) -> None:
         if model not in CURVES:
             raise InputError(f"no curve model {model!r}", hint=f"choose one of {', '.join(CURVES)}")
@@ -81,6 +84,7 @@ class AdhesionCurve:
         self.model, self.fixed, self.intercept, self.weights = model, fixed, intercept, weights
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds, self.common_slip_sd = common_sd, dict(bounds or {}), common_slip_sd
+        self.start = None if start is None else dict(start)
         self.written_band: tuple[Floats, Floats, Floats] | None = None  # slip, low, high of a stored fit
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
@@ -111,7 +115,7 @@ class AdhesionCurve:
         weights = self._bin_weights(bins)[used]
         best = np.empty(0)
         if free:
-            begin = starts(curve, free, mean)
+            begin = starts(curve, free, mean) if self.start is None else self._start(curve, free)
             many = np.ones((len(begin), 1))
             x, cost = solve(curve, free, held, many * slip, many * mean, many * weights, begin)
             best = x[int(np.argmin(cost))]
@@ -260,6 +264,16 @@ class AdhesionCurve:
             own[name] = replace(own[name], lower=float(lower), upper=float(upper))
         return replace(curve, parameters=tuple(own.values()))
 
+    def _start(self, curve: CurveModel, free: Sequence[str]) -> Floats:
+        """The given start as the one row of (starts, free); what it does not name begins at the model's own start."""
+        own = {p.name: p.start for p in curve.parameters} | {INTERCEPT: 0.0}
+        given = self.start or {}
+        if unknown := sorted(set(given) - set(own)):
+            raise InputError(
+                f"a start of {unknown[0]!r}", hint=f"the curve model has {', '.join(curve.names)}"
+            )
+        return np.array([[given.get(name, own[name]) for name in free]], dtype=float)
+
     def _bin_weights(self, bins: Bins) -> Floats:
         if self.weights is None:
             return bins.used.astype(float)
@@ -320,6 +334,7 @@ class AdhesionCurve:
                 "common_sd",
                 "bounds",
                 "common_slip_sd",
+                "start",
             )
         }
         return AdhesionCurve(**{**same, **changes})

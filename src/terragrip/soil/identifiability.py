@@ -128,7 +128,7 @@ def _by_slips(
         names.append("intercept")
     matrix = np.stack(columns, axis=-1)
     _, values, rows = np.linalg.svd(matrix, full_matrices=False)
-    condition = float(values[0] / max(values[-1], values[0] * 1e-16))
+    condition = float(values[0] / max(values[-1], values[0] * 1e-16)) if values[0] > 0 else 1e16
     effective = effective_parameters(parameters) if model.name == "exponential" else None
     if condition < LIMIT and r2 < POOR:
         sentence = f"The curve explains little of the bins (R2 {r2:.2f}), so they do not fix {', '.join(names)}: use it as a hint only."

@@ -27,6 +27,7 @@ ROUTES = (
     "columns",
     "machines",
     "jobs",
+    "curves",
     "fit",
     "pictures",
     "drive",

@@ -1,4 +1,4 @@
-"""The fit page: curve models, soils of the folder with their points and bins, fits, and saving to a library."""
+"""The fit page: soils of the folder with their points and bins, fits, and saving to a library."""
 
 from __future__ import annotations
 
@@ -23,10 +23,6 @@ router = APIRouter(tags=["fit"])
 
 SHOWN = 4000
 """Points of one soil that a page gets; the fit takes them all."""
-
-
-SLIPS = np.linspace(-1.0, 1.0, 401)
-"""Slips that curves are sampled at for the pages."""
 
 
 class BinChoice(BaseModel):
@@ -60,13 +56,9 @@ class FitRequest(BaseModel):
     soil: str | None = None
     bins: BinChoice | None = Field(None, description="None: those of `terragrip soils`.")
     bootstrap: int = Field(1000, ge=0, le=5000)
-
-
-class CurveRequest(BaseModel):
-    """A curve as a page draws it; parameters that are left out have their start values."""
-
-    model: str
-    parameters: dict[str, FiniteFloat] = {}
+    start: dict[str, FiniteFloat] | None = Field(
+        None, description="Where the fit begins, in place of its own starts."
+    )
 
 
 class SaveRequest(BaseModel):
@@ -82,42 +74,6 @@ class SaveRequest(BaseModel):
     bins: list[dict[str, FiniteFloat]] = []
     source: str = "studio"
     replace: bool = False
-
-
-@router.get("/models")
-def models() -> list[dict[str, Any]]:
-    """Every curve model: its parameters with unit, bounds and start, which of them a fit holds, its source."""
-    return [
-        {
-            "name": model.name,
-            "source": model.source,
-            "fixed": sorted(model.fixed),
-            "parameters": [
-                {"name": p.name, "unit": p.unit, "lower": p.lower, "upper": p.upper, "start": p.start, "meaning": p.meaning}
-                for p in model.parameters
-            ],
-        }
-        for model in CURVES.values()
-    ]  # fmt: skip
-
-
-@router.post("/curve")
-def curve(wanted: CurveRequest) -> dict[str, Any]:
-    """Samples of a curve over slip, and where its largest value lies: the pages draw these and compute no model."""
-    if wanted.model not in CURVES:
-        raise InputError(
-            f"there is no curve model {wanted.model!r}", hint=f"choose one of {', '.join(CURVES)}"
-        )
-    model = CURVES[wanted.model]
-    own = {name: value for name, value in wanted.parameters.items() if name != "intercept"}
-    try:
-        values = model.value(SLIPS, own, wanted.parameters.get("intercept", 0.0))
-    except ValueError as error:
-        raise InputError(str(error)) from None
-    plain: dict[str, Any] = finite(
-        {"slip": SLIPS.tolist(), "value": values.tolist(), "peak": model.peak(own)}
-    )
-    return plain
 
 
 @router.get("/literature")
@@ -213,6 +169,7 @@ def _unfitted(wanted: FitRequest, bins: BinSettings) -> AdhesionCurve:
         bins,
         wanted.bootstrap,
         bounds=wanted.bounds,
+        start=wanted.start,
     )
 
 
