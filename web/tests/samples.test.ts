@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { at, farthest, Sampler, type Form, type Samples } from "../src/fit/samples";
 
 const slip = Array.from({ length: 401 }, (_, i) => -1 + i / 200);
-const line = (a: number): Samples => ({ slip, value: slip.map((s) => a * s), peak: [1, a] });
+const line = (a: number): Samples => ({ slip, value: slip.map((s) => a * s), peak: [1, a], initial_slope: a, handles: [] });
 
 test("values stand on straight lines between samples, none beyond them", () => {
   for (const s of [-1, -0.3333, 0, 0.1234, 1]) expect(at(line(2), s)).toBeCloseTo(2 * s, 12);

@@ -36,11 +36,11 @@ export class CurvesPanel {
 
   constructor(
     private state: State,
-    private actions: { fit: () => Promise<void>; each: (progress: (text: string) => void) => Promise<void>; save: () => void },
+    private actions: { fit: (here: boolean) => Promise<void>; each: (progress: (text: string) => void) => Promise<void>; save: () => void },
   ) {
     state.on((change) => {
       if (change === "all") this.draw();
-      if (change === "curve") this.tellApart();
+      if (change === "curve") this.follow();
     });
   }
 
@@ -75,13 +75,14 @@ export class CurvesPanel {
       h("div", { class: "field" }, h("label", { for: "curve-name" }, "Name"), this.nameField(curve)),
       h("div", { class: "field" }, h("label", { for: "curve-model" }, "Model"), this.modelChoice(curve)),
       h("p", { class: "source" }, model?.source ?? ""),
-      h("p", { class: "hint" }, "Ticked: held, a fit does not change it. Below each slider: the limits of a fit."),
+      h("p", { class: "hint" }, "Drag the curve by its handles, or the sliders. Ticked: held, neither a drag nor a fit changes it. Below each slider: the limits of both."),
       parameters.map((p) => this.row(curve, p)),
       this.interceptChoice(curve),
       h(
         "div",
         { class: "row" },
-        h("button", { type: "button", class: "primary", id: "fit-button", click: () => void this.work((progress) => (progress("Fitting …"), this.actions.fit())) }, "Fit to points"),
+        h("button", { type: "button", class: "primary", id: "fit-button", click: () => void this.work((progress) => (progress("Fitting …"), this.actions.fit(false))) }, "Fit to points"),
+        h("button", { type: "button", id: "fit-here", click: () => void this.work((progress) => (progress("Fitting …"), this.actions.fit(true))), title: "A fit that begins at the curve as it is now, and ends in the nearest minimum" }, "Fit from here"),
         h("button", { type: "button", id: "fit-each", click: () => void this.work((progress) => this.actions.each(progress)), title: "A curve for each soil that is shown, with this model, its held parameters and limits" }, "Fit each soil"),
         h("button", { type: "button", click: this.actions.save }, "Save to library"),
       ),
@@ -195,9 +196,10 @@ export class CurvesPanel {
       this.settle();
     });
     this.rows.set(name, { slider, field, parameter });
-    const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: a fit does not change it`, title: "hold: a fit does not change it" });
+    const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: neither a drag nor a fit changes it`, title: "hold: neither a drag nor a fit changes it" });
     hold.addEventListener("change", () => {
       curve.held = hold.checked ? [...curve.held, name] : curve.held.filter((other) => other !== name);
+      this.state.changed("curve"); // other handles
       this.settle();
     });
     return h(
@@ -261,9 +263,30 @@ export class CurvesPanel {
     return Number.isFinite(slip) ? `By hand: µ is ${off > 0 ? "+" : "−"}${digits(Math.abs(off), 2)} off this fit at ${said(slip)} slip, the most from ${digits(0.05 * unit.scale)} to ${said(0.6)}.` : "";
   }
 
+  /** The sliders and fields go with a curve that is dragged. */
+  private follow(): void {
+    const curve = this.state.active;
+    for (const [name, { slider, field }] of this.rows) {
+      const now = curve?.parameters[name];
+      if (now === undefined || document.activeElement === slider || document.activeElement === field) continue;
+      slider.min = String(Math.min(Number(slider.min), now));
+      slider.max = String(Math.max(Number(slider.max), now));
+      slider.value = String(now);
+      field.value = digits(now, 5);
+    }
+    this.tellApart();
+  }
+
   private tellApart(): void {
     const [said, curve] = [this.element.querySelector(".apart"), this.state.active];
     if (said && curve?.fit) said.textContent = sameCurve(curve) ? "" : this.apart(curve, curve.fit);
+  }
+
+  private back(curve: Curve, fit: FitResult): void {
+    curve.parameters = { ...fit.parameters };
+    this.state.commit();
+    this.state.changed("all");
+    document.getElementById("fit-button")?.focus();
   }
 
   private interceptChoice(curve: Curve): HTMLElement {
@@ -297,7 +320,9 @@ export class CurvesPanel {
       "div",
       { class: `result${sameCurve(curve) ? "" : " stale"}`, "aria-live": "polite" },
       h("p", { class: "apart" }, sameCurve(curve) ? "" : this.apart(curve, fit)),
+      sameCurve(curve) ? null : h("button", { type: "button", id: "back-to-fit", click: () => this.back(curve, fit) }, "Back to the fit"),
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
+      fit.automatic === undefined ? null : h("p", {}, `Begun at the curve as it was${fit.automatic === null ? "" : `; the automatic fit had R² ${digits(fit.automatic)}`}.`),
       h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
       h("p", { class: `badge ${identified ? "good" : "poor"}` }, identified ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),
       fit.at_bound.length ? h("p", { class: "hint" }, `${fit.at_bound.map((name) => SYMBOLS[name] ?? name).join(", ")}: at a limit of its range, so the data do not determine it. Hold it, or fit with more slip.`) : null,

@@ -4,8 +4,8 @@ import { send } from "../ui/api";
 import { note, tried } from "../ui/notes";
 import type { Curve, FitResult, Soil, State } from "./state";
 
-/** Fit the active curve to the chosen points. */
-export async function fit(state: State): Promise<void> {
+/** Fit the active curve to the chosen points; from where it is (`here`), or from the starts that the server tries. */
+export async function fit(state: State, here = false): Promise<void> {
   const curve = state.active;
   if (!curve) return;
   const data = points(state);
@@ -13,7 +13,9 @@ export async function fit(state: State): Promise<void> {
     note("Choose a soil, or digitise a line of a picture, first.", "error");
     return;
   }
-  if (!(await fitTo(curve, data, state.target.replace(/^picture:/, "")))) return;
+  const before = curve.fit;
+  if (!(await fitTo(curve, here ? { ...data, start: curve.parameters } : data, state.target.replace(/^picture:/, "")))) return;
+  if (here && curve.fit) curve.fit.automatic = before?.automatic ?? before?.r2 ?? null;
   state.commit();
   state.changed("all");
 }

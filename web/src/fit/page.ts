@@ -22,7 +22,7 @@ export const page: Page = (main, { notices, query }) => {
   const plot = new Plot(state);
   const pictures = new PicturesPanel(state, () => plot.fit());
   const list = new ListPanel(state, () => plot.fit(), pictures.element);
-  const curves = new CurvesPanel(state, { fit: () => fit(state), each: (progress) => fitEach(state, progress), save: () => void keep(state) });
+  const curves = new CurvesPanel(state, { fit: (here) => fit(state, here), each: (progress) => fitEach(state, progress), save: () => void keep(state) });
   const residuals = new Residuals(state, plot.view);
   const loupe = new Loupe(plot.element, state, plot.view);
   const undo = h("button", { type: "button", click: () => step("undo"), title: "Ctrl+Z" }, "Undo");
@@ -40,8 +40,9 @@ export const page: Page = (main, { notices, query }) => {
     h("button", { type: "button", click: () => void curveTable(state), title: "The curves that are shown, every per cent of slip" }, "Curves CSV"),
     h("button", { type: "button", id: "points-csv", click: () => pointTable(state), title: "Points, bins and digitised points that are shown" }, "Points CSV"),
   );
-  main.append(list.element, h("section", { class: "middle", "aria-label": "Plot" }, tools, plot.element, residuals.element), curves.element);
+  main.append(list.element, h("section", { class: "middle", "aria-label": "Plot" }, tools, plot.quality, plot.element, residuals.element), curves.element);
   plot.onView = () => residuals.later();
+  plot.handles.hidden = () => pictures.isDigitising;
   loupe.wanted = () => pictures.isDigitising;
   plot.onClick = (at, shift) => pictures.click(at, shift);
   state.on(() => {

@@ -1,17 +1,20 @@
 /** The plot: three canvases one over the other (pictures, data, curves), so that a moved slider redraws the curves alone. */
 
-import { h } from "../ui/dom";
+import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { onUnits, unitFor, withUnit } from "../ui/units";
 import { CanvasInk, SvgInk, type Ink } from "../ui/ink";
 import { mapOf, type Calibration, type Pixel } from "./picture";
-import { drawAxes, drawCurve, drawLegend, drawSoil } from "./scene";
+import { Handles } from "./handles";
+import { quality, targetOf } from "./quality";
+import { drawAxes, drawCurve, drawFit, drawLegend, drawSoil, sameCurve } from "./scene";
 import type { Change, State } from "./state";
 import { View } from "../ui/view";
 
 export class Plot {
   readonly element: HTMLElement;
   readonly view = new View();
+  readonly handles: Handles;
   /** Called with slip and adhesion under a click, and the pixel of the screen. */
   onClick: ((value: Pixel, shift: boolean) => void) | null = null;
   /** Another part of the plane is shown. */
@@ -21,16 +24,20 @@ export class Plot {
   private stale = new Set<number>([0, 1, 2]);
   private asked = false;
   private readout = h("output", { class: "readout", "aria-hidden": "true" });
+  /** A line for the page: how well the active curve goes through the data. */
+  readonly quality = h("p", { class: "quality", id: "quality" });
   private forgets: (() => void)[];
   private watcher: ResizeObserver;
 
   constructor(private state: State) {
     this.layers = [0, 1, 2].map(() => h("canvas", { "aria-hidden": "true" }));
+    this.handles = new Handles(state, this.view);
     this.element = h(
       "div",
-      { class: "plot", tabindex: "0", role: "img", "aria-label": "Adhesion over slip. Arrow keys move, plus and minus zoom, 0 shows all." },
+      { class: "plot", tabindex: "0", role: "group", "aria-label": "Adhesion over slip. Arrow keys move, plus and minus zoom, 0 shows all; Tab goes to the handles of the curve." },
       this.layers,
       this.readout,
+      this.handles.element,
     );
     this.watcher = new ResizeObserver(() => this.resize());
     this.watcher.observe(this.element);
@@ -92,6 +99,23 @@ export class Plot {
       drawers[layer]?.call(this, pen);
     }
     this.stale.clear();
+    this.handles.place();
+    this.quality.textContent = this.judged();
+  }
+
+  /** Of the active curve over the chosen data, also while it moves, beside what its fit reached. */
+  private judged(): string {
+    const { state } = this;
+    const [curve, target] = [state.active, targetOf(state)];
+    const samples = curve && state.samples.of(curve.id, curve);
+    if (!curve?.shown || !samples) return "";
+    const unit = unitFor("share");
+    const [slip, value] = samples.peak;
+    const shape = `initial slope ${digits(samples.initial_slope)}, ${slip < 0.999 ? `largest µ ${digits(value + (curve.parameters["intercept"] ?? 0))} at ${withUnit(digits(unit.scale * slip), unit)} slip` : "µ rises with slip"}`;
+    if (!target?.bins.length) return shape;
+    const { r2, rms, count } = quality(target.bins, samples);
+    const fitted = curve.fit && !sameCurve(curve) ? ` (fit ${digits(curve.fit.r2)})` : "";
+    return `${target.name}: R² ${digits(r2)}${fitted}, RMS ${digits(rms, 2)}, ${count} bins; ${shape}`;
   }
 
   private drawPictures(pen: CanvasRenderingContext2D): void {
@@ -126,6 +150,7 @@ export class Plot {
 
   private inkCurves(ink: Ink): void {
     const { curves, active } = this.state.kept;
+    for (const curve of curves) if (curve.shown && curve.fit && !sameCurve(curve)) drawFit(ink, this.view, curve, this.state.samples.of(`fit ${curve.id}`, curve.fit));
     for (const curve of curves) if (curve.shown) drawCurve(ink, this.view, curve, curve.id === active, this.state.samples.of(curve.id, curve));
   }
 

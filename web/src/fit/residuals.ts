@@ -3,15 +3,16 @@
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { CanvasInk } from "../ui/ink";
+import { quality, targetOf, type Quality, type Target } from "./quality";
 import { at } from "./samples";
-import type { Soil, State } from "./state";
+import type { State } from "./state";
 import { ticks, View } from "../ui/view";
 
 export class Residuals {
   readonly element = h("div", { class: "residuals", role: "img", "aria-label": "Residuals: bins less the active curve, over slip", hidden: true });
   readonly button = h("button", { type: "button", id: "residuals", "aria-pressed": "false" }, "Residuals");
-  /** Of the bins shown last: their number, root mean square and largest; for the tests too. */
-  summary = { count: 0, rms: NaN, largest: NaN };
+  /** Of the bins shown last; for the tests too. */
+  summary: Quality = { count: 0, rms: NaN, largest: NaN, r2: NaN };
   private canvas = h("canvas", { "aria-hidden": "true" });
   private view = new View();
   private asked = false;
@@ -57,17 +58,15 @@ export class Residuals {
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     const ink = new CanvasInk(pen);
     const curve = this.state.active;
-    const soil = this.state.soils.find((one) => one.key === this.state.target) ?? this.state.soils[0];
+    const target = targetOf(this.state);
     const samples = curve && this.state.samples.of(curve.id, curve);
-    if (!curve || !soil || !samples) {
-      ink.text("Residuals need a curve and a soil with bins.", width / 2, height / 2, color("muted"), "middle");
+    if (!curve || !target || !samples) {
+      ink.text("Residuals need a curve, and a soil or a digitised line.", width / 2, height / 2, color("muted"), "middle");
       return;
     }
     const left = (s: number, mu: number): number => mu - at(samples, s);
-    const bins = binsOf(soil);
-    const known = bins.map((bin) => left(bin.slip, bin.mean)).filter(Number.isFinite);
-    const largest = Math.max(...known.map(Math.abs), 0);
-    this.summary = { count: known.length, rms: Math.sqrt(known.reduce((sum, r) => sum + r * r, 0) / known.length), largest };
+    const { bins } = target;
+    this.summary = quality(bins, samples);
     const most = Math.max(...bins.map((bin) => Math.abs(left(bin.slip, bin.mean)) + bin.std).filter(Number.isFinite), 0.01) * 1.1;
     Object.assign(this.view, { x: { ...this.above.x }, y: { low: -most, high: most }, width, height, top: 22, bottom: 8 });
     const { view } = this;
@@ -75,25 +74,18 @@ export class Residuals {
       ink.line([view.left, view.py(y), width - view.right, view.py(y)], { color: color(y === 0 ? "muted" : "grid") });
       ink.text(digits(y), view.left - 8, view.py(y), color("muted"), "end");
     }
-    ink.text(`Residual µ of ${soil.name} less ${curve.name}: ${known.length} bins, RMS ${digits(this.summary.rms, 2)}, largest ${digits(largest, 2)}`, view.left, 10, color("ink"), "start");
-    ink.clipped(view.box, () => this.drawBins(ink, soil, left));
+    ink.text(`Residual µ of ${target.name} less ${curve.name}: ${this.summary.count} bins, RMS ${digits(this.summary.rms, 2)}, largest ${digits(this.summary.largest, 2)}`, view.left, 10, color("ink"), "start");
+    ink.clipped(view.box, () => this.drawBins(ink, target, left));
   }
 
-  private drawBins(ink: CanvasInk, soil: Soil, left: (s: number, mu: number) => number): void {
+  private drawBins(ink: CanvasInk, { bins, cloud, color: name }: Target, left: (s: number, mu: number) => number): void {
     const { view } = this;
-    const bins = binsOf(soil);
-    const shade = color(soil.color);
-    const cloud = soil.points.slip.flatMap((s, i) => [view.px(s), view.py(left(s, soil.points.adhesion[i] ?? NaN))]);
-    if (soil.bins.length) ink.dots(cloud, 1, shade, 0.25);
+    const shade = color(name);
+    ink.dots(cloud.slip.flatMap((s, i) => [view.px(s), view.py(left(s, cloud.adhesion[i] ?? NaN))]), 1, shade, 0.25);
     for (const bin of bins) {
       const r = left(bin.slip, bin.mean);
       ink.line([view.px(bin.slip), view.py(r - bin.std), view.px(bin.slip), view.py(r + bin.std)], { color: shade, width: 1.2 });
     }
     ink.dots(bins.flatMap((bin) => [view.px(bin.slip), view.py(left(bin.slip, bin.mean))]), 4, shade, 1);
   }
-}
-
-/** The bins of a soil; of digitised points each point. */
-function binsOf(soil: Soil): { slip: number; mean: number; std: number }[] {
-  return soil.bins.length ? soil.bins : soil.points.slip.map((slip, i) => ({ slip, mean: soil.points.adhesion[i] ?? NaN, std: 0 }));
 }

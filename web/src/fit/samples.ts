@@ -4,19 +4,33 @@ import { send } from "../ui/api";
 
 export type Parameters = Record<string, number>;
 
+export interface Handle {
+  name: "zero" | "rise" | "peak" | "level";
+  slip: number;
+  value: number;
+}
+
 export interface Samples {
   slip: number[];
   value: (number | null)[];
   /** Slip and value of the largest value, without an intercept. */
   peak: [number, number];
+  /** Slope at zero slip. */
+  initial_slope: number;
+  /** Points of the curve that can be dragged. */
+  handles: Handle[];
 }
 
 export interface Form {
   model: string;
   parameters: Parameters;
+  /** Parameters that a drag leaves as they are. */
+  held?: string[];
 }
 
-export const sampled = (form: Form): Promise<Samples> => send<Samples>("POST", "curve", { model: form.model, parameters: form.parameters });
+const keyOf = ({ model, parameters, held }: Form): string => JSON.stringify([model, parameters, held]);
+
+export const sampled = ({ model, parameters, held }: Form): Promise<Samples> => send<Samples>("POST", "curve", { model, parameters, held });
 
 /** Value at a slip, on straight lines between the samples; NaN beyond them. */
 export function at(samples: Samples, slip: number): number {
@@ -57,7 +71,7 @@ export class Sampler {
 
   /** The last samples of the curve `id`, perhaps of a moment ago; requests new ones where needed. */
   of(id: string | number, form: Form): Samples | null {
-    const key = JSON.stringify([form.model, form.parameters]);
+    const key = keyOf(form);
     const known = this.known.get(id) ?? { key: "", samples: null, asking: false };
     this.known.set(id, known);
     if (known.key !== key && !known.asking) void this.renew(known, key, form);
@@ -66,12 +80,17 @@ export class Sampler {
 
   /** Whether the samples of a curve are those of its parameters. */
   isCurrent(id: string | number, form: Form): boolean {
-    return this.known.get(id)?.key === JSON.stringify([form.model, form.parameters]);
+    return this.known.get(id)?.key === keyOf(form);
+  }
+
+  /** Samples of a curve that came with its parameters. */
+  put(id: string | number, form: Form, samples: Samples): void {
+    this.known.set(id, { key: keyOf(form), samples, asking: false });
   }
 
   private async renew(known: Known, key: string, form: Form): Promise<void> {
     known.asking = true;
-    const asked = { model: form.model, parameters: { ...form.parameters } };
+    const asked = { model: form.model, parameters: { ...form.parameters }, ...(form.held ? { held: [...form.held] } : {}) };
     try {
       known.samples = await this.ask(asked);
     } catch {

@@ -50,19 +50,27 @@ export function drawSoil(ink: Ink, view: View, soil: Soil): void {
 export function drawCurve(ink: Ink, view: View, curve: Curve, active: boolean, samples: Samples | null): void {
   const shade = color(curve.color);
   const band = curve.fit?.band;
-  if (band && sameCurve(curve)) {
+  if (band) {
     const outline: number[] = [];
     band.slip.forEach((s, i) => outline.push(view.px(s), view.py(band.high[i] as number)));
     for (let i = band.slip.length - 1; i >= 0; i--) outline.push(view.px(band.slip[i] as number), view.py(band.low[i] as number));
     ink.area(outline, shade, 0.18);
   }
-  if (!samples) return;
+  if (samples) ink.line(pointsOf(samples, view), { color: shade, width: active ? 2.6 : 1.6 });
+}
+
+/** What the fit of a curve found, where the curve has been moved since. */
+export function drawFit(ink: Ink, view: View, curve: Curve, samples: Samples | null): void {
+  if (samples) ink.line(pointsOf(samples, view), { color: color(curve.color), width: 1.6, dash: [7, 5] });
+}
+
+function pointsOf(samples: Samples, view: View): Float64Array {
   const points = new Float64Array(2 * samples.slip.length);
   samples.slip.forEach((s, i) => {
     points[2 * i] = view.px(s);
     points[2 * i + 1] = view.py(samples.value[i] ?? NaN);
   });
-  ink.line(points, { color: shade, width: active ? 2.6 : 1.6 });
+  return points;
 }
 
 /** Whether the curve still is what its fit found: a moved slider parts them. */

@@ -35,6 +35,8 @@ export interface FitResult {
   at_bound: string[];
   band?: { slip: number[]; low: number[]; high: number[] };
   peak: [number, number];
+  /** Of a fit that began at the curve as it was set by hand: R² of the automatic fit before, null where there was none. */
+  automatic?: number | null;
 }
 
 export interface Bin {
