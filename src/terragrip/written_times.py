@@ -12,7 +12,9 @@ _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:(?:[.,]|:(?=\d{
 _TIME = re.compile(_CLOCK)
 _NAMED = (
     re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>(?:\d\d)?\d\d),?[ T]+{_CLOCK}"),
-    re.compile(rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}Z?"),
+    re.compile(
+        rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+    ),
 )
 _EITHER = re.compile(
     rf"(?P<one>\d{{1,2}})(?P<sign>[/-])(?P<two>\d{{1,2}})(?P=sign)(?P<year>\d{{4}}),?[ T]+{_CLOCK}"
@@ -29,10 +31,11 @@ FORMS = "give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5"
 def times_of(
     cells: Sequence[str | None], order: str | None = None
 ) -> npt.NDArray[np.float64] | npt.NDArray[np.datetime64] | None:
-    """Times of day as seconds (n,), dates with them as datetime64 (n,); None where some cell is neither, or they differ in form.
+    """Times of day as seconds (n,), dates with them as datetime64 (n,), in UTC where they state a zone.
 
-    A time of day that runs back by more than half a day is of the next day. Empty cells are missing. 13/04/2024 shows which number is
-    the day, for all cells; where none does, ``order``, of `ORDERS`, says it, and without it the dates are none.
+    None where some cell is neither, or they differ in form. A time of day that runs back by more than half a day is of the next day. Empty
+    cells are missing. 13/04/2024 shows which number is the day, for all cells; where none does, ``order``, of `ORDERS`, says it, and
+    without it the dates are none.
     """
     matches = _matches(cells)
     if matches is None:
@@ -113,7 +116,16 @@ def _seconds(match: re.Match[str]) -> float:
         if not 1 <= hour <= 12:
             raise ValueError("not an hour of a half day")
         hour = hour % 12 + 12 * (half in "Pp")
-    return 3600 * hour + 60 * int(match["minute"]) + int(match["second"]) + int(part) / 10 ** len(part)
+    of_day = 3600 * hour + 60 * int(match["minute"]) + int(match["second"]) + int(part) / 10 ** len(part)
+    return of_day - _east(match.groupdict().get("zone"))
+
+
+def _east(zone: str | None) -> int:
+    """By how many seconds a zone's clock (``+02:00``) is ahead of UTC."""
+    if zone is None or zone == "Z":
+        return 0
+    sign, digits = zone[0], zone[1:].replace(":", "")
+    return int(f"{sign}1") * (3600 * int(digits[:2]) + 60 * int(digits[2:] or 0))
 
 
 def _day(match: re.Match[str] | None, order: str | None) -> str:

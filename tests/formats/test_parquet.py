@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.formats import parquet, read
+from terragrip.formats import inspect, parquet, read
 from terragrip.formats.log_blocks import recordings_of
 from terragrip.recording import Recording
 
@@ -40,6 +41,29 @@ def test_types_become_numbers_and_labels(tmp_path: Path, log: pd.DataFrame) -> N
     assert recording["soil"][0] == "grass"
     assert np.flatnonzero(np.isnan(recording["ground_speed"])).tolist() == [3]
     assert recording["drawbar_force"].dtype == np.float64
+
+
+def test_json_as_a_struct_in_parquet_is_inspected_and_read(tmp_path: Path) -> None:
+    """A telemetry's objects, one a line, by pandas: its structs were passed over in silence, its stamps no time."""
+    when = pd.Timestamp("2026-07-01 14:00") + pd.to_timedelta(np.arange(300) / 10, unit="s")
+    speed = 1 + 0.3 * np.sin(np.arange(300) / 40)
+    rows = [
+        {
+            "ts": f"{t.isoformat(timespec='milliseconds')}+02:00",
+            "gnss": {"speed_mps": v},
+            "wheels": {side: {"rpm": 30 * v} for side in "lr"},
+        }
+        for t, v in zip(when, speed, strict=True)
+    ]
+    (tmp_path / "log.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    path = put(tmp_path, pd.read_json(tmp_path / "log.jsonl", lines=True))
+    found = inspect(path)
+    assert set(found.proposals) == {"ground_speed", "wheel_speed_l", "wheel_speed_r"}
+    (tmp_path / "p.yaml").write_text(found.profile)
+    recording = read(path, tmp_path / "p.yaml")
+    np.testing.assert_allclose(recording["ground_speed"], speed)
+    assert recording.time[-1] == pytest.approx(29.9)
+    assert recording.start == pd.Timestamp("2026-07-01 12:00", tz="UTC").timestamp()
 
 
 def in_blocks(path: Path, rows: int) -> list[Recording]:

@@ -48,7 +48,7 @@ def detect(data: bytes, source: str) -> Dialect:
     if not lines:
         raise InputError("is empty", file=source, hint="give a table with a header and rows")
     if lines[0].lstrip().startswith(("{", "[{")):
-        hint = "save it as CSV or Parquet, e.g. by pandas.read_json(...).to_parquet(...)"
+        hint = "save it as CSV or Parquet, e.g. by pandas.read_json(FILE, lines=True).to_parquet(...) if each line is an object"
         raise InputError("is JSON", file=source, hint=hint)
     if lines[0].lower().startswith("sep="):  # Excel's own hint
         start = _after_lines(data, start, 1)

@@ -29,9 +29,10 @@ from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
 from terragrip.recording.repeats import Repeats, merged
-from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
+from terragrip.recording.schema import LABELS, TIME, has_torque, is_own, unit_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
+from terragrip.written_times import times_of
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (
@@ -225,7 +226,13 @@ class Seen:
                 columns, units, TimeColumn(TIME, "s"), base - first, clocks, since_1970=False, whole=whole
             )
         written = {n: v for n, c in log.columns.items() if (v := numbers_of(c)) is not None}
-        log = replace(log, columns={**log.columns, **written})
+        texts = {
+            n: c.tolist()
+            for n, c in log.columns.items()
+            if c.dtype == object and n not in (*LABELS, *written)
+        }
+        dated = {n: times for n, cells in texts.items() if (times := times_of(cells)) is not None}
+        log = replace(log, columns={**log.columns, **written, **dated})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind in "mM")
         stamp = find_time(numbers, dates, log.units, vocabulary)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
@@ -25,9 +25,12 @@ _BLOCK = 20_000  # rows that are read or left out together, where a log is looke
 def parquet_on_disk(path: str) -> TableOnDisk:
     """A Parquet file; raises InputError if it is damaged or none, and for columns that hold neither numbers, texts nor dates."""
     with _opened(path) as file:
-        names = tuple(str(name) for name in file.schema_arrow.names)
+        fields = tuple(_leaves(file.schema_arrow))
+        names = tuple(str(field.name) for field in fields)
         count = int(file.metadata.num_rows)
-        unreadable = tuple(field.name for field in file.schema_arrow if not _is_readable(field))
+        unreadable = tuple(field.name for field in fields if not _is_readable(field))
+
+    import pyarrow as pa
 
     def blocks(chosen: list[str], every: int) -> Iterator[Columns]:
         _refuse_twice(names, chosen, path)
@@ -36,12 +39,33 @@ def parquet_on_disk(path: str) -> TableOnDisk:
             number = 0
             while (batch := _guarded(path, lambda: next(batches, None))) is not None:
                 if number % every == 0:
-                    yield {name: from_arrow(name, batch.column(name), path) for name in chosen}
+                    table = _flat(pa.Table.from_batches([batch]))
+                    yield {name: from_arrow(name, table.column(name), path) for name in chosen}
                 number += 1
 
     return TableOnDisk(
         names, {}, path, count, blocks, is_long=os.path.getsize(path) >= _LONG, unreadable=unreadable
     )
+
+
+def _leaves(fields: Iterable[pa.Field]) -> Iterator[pa.Field]:
+    """Fields, those of structs as ``imu.pitch``: what JSON becomes in Parquet."""
+    import pyarrow as pa
+
+    for field in fields:
+        if pa.types.is_struct(field.type):
+            yield from _leaves(field.flatten())
+        else:
+            yield field
+
+
+def _flat(table: pa.Table) -> pa.Table:
+    """A table whose columns are the `_leaves` of its fields."""
+    import pyarrow as pa
+
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
 
 
 def _is_readable(field: pa.Field) -> bool:
