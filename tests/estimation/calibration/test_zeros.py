@@ -95,6 +95,25 @@ def test_stops_that_read_alike_outvote_stops_that_hold(drive: Make, vehicle: Veh
         assert len(quantity.evidence) == 4
 
 
+def test_motors_that_hold_the_vehicle_on_slopes_show_no_zero(drive: Make, vehicle: Vehicle) -> None:
+    """Three stops on slopes, of which two read alike, by chance: 140 kg times g sin(pitch), by a speed control; then one without."""
+    pitches = (0.02, -0.015, -0.0152)
+    stops = []
+    for k, pitch in enumerate(pitches):
+        held = 0.9 * 140 * GRAVITY * np.sin(pitch) * 0.2 / 4
+        log = drive(40, offset=OFFSET, standing=5, noise=1.0, seed=k, held_torque=held)
+        stops.append(log.with_channels(pitch=np.full(len(log), pitch)))
+    unsure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_offset": 2.0}})
+    result = calibrate(stops, unsure)
+    assert "drive_torque_offset fl" not in result
+    assert any("those that hold the vehicle: stand with the motors off" in u.why for u in result.unknown)
+    off = drive(40, offset=OFFSET, standing=10, noise=1.0, seed=7)
+    result = calibrate([*stops, off.with_channels(pitch=np.full(len(off), 0.02))], unsure)
+    for wheel, offset in zip(WHEELS, OFFSET, strict=True):
+        quantity = result[f"drive_torque_offset {wheel}"]
+        assert abs(quantity.value - offset) < 4 * quantity.std < 0.4
+
+
 def test_drawbar_zero_and_a_taut_bar(drive: Make, vehicle: Vehicle) -> None:
     slack = calibrate(drive(60, drawbar_offset=-5.0, standing=10, noise=1.0), vehicle)["drawbar_offset"]
     assert abs(slack.value + 5.0) < 4 * slack.std

@@ -6,7 +6,7 @@ the ground is level or its slope is measured. Where the readings contradict that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -34,6 +34,10 @@ _UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle nev
 _ALIKE = 3.0  # standard errors
 _ALONE = 4.0  # s that one stop must last to count without another that agrees: whoever stands for the zeros stands 10 s
 _ONE_SHORT_STOP = "one short stop, or stops that disagree: stand 10 s with the motors off and the bar slack, or twice with driving between"
+_HOLDING = (
+    0.3,
+    1.5,
+)  # of the weight along the slope: wheels that hold the vehicle carry it, less what the ground's resistance does
 _IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
 
 
@@ -185,11 +189,22 @@ def torque_zeros(
     stated = 3 * (vehicle.uncertainty.drive_torque_offset or 0.0)
     allowed = np.maximum(stated, _IDLE_SHARE * _work(windows, torque))
     calm = resting(windows, torque, stops, windows.torque_count, noise, allowed, stated)
+    shares = {spell: _held_share(windows, vehicle, torque, spell) for spell in stops}
+    holding = [spell for spell, share in shares.items() if _HOLDING[0] < share < _HOLDING[1]]
+    level = 0.0  # N m: what may hold the vehicle unseen, where it is held on slopes
+    if holding and not _released(calm, shares, holding):
+        free = [spell for spell in stops if spell not in holding]
+        calm = resting(windows, torque, free, windows.torque_count, noise, allowed, stated)
+        if not calm:
+            why = "at standstill on a slope the torques are those that hold the vehicle: stand with the motors off"
+            return [], [Unknown(key, why)]
+        if not _released(calm, shares, holding):
+            level = _DEFAULT_PITCH * vehicle.mass * GRAVITY * float(vehicle.wheel_radius.mean()) / len(driven)
     if not calm:
         least = min(
             (stop_means(torque, spell) for spell in stops), key=lambda mean: np.max(np.abs(mean) - allowed)
         )
-        holding = [
+        held = [
             Unknown(
                 f"{key} {wheel}",
                 f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle",
@@ -197,14 +212,31 @@ def torque_zeros(
             for wheel, value, most in zip(wheels, least, allowed, strict=True)
             if abs(value) > most
         ]
-        return [], holding or [Unknown(key, _ONE_SHORT_STOP)]
+        return [], held or [Unknown(key, _ONE_SHORT_STOP)]
     quantities = []
     for wheel, values in zip(wheels, torque.T, strict=True):
         value, error = spell_mean(values, calm, windows.torque_count, noise)
         sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
         entry = evidence(windows, calm, sources, windows.torque_count)
-        quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
+        quantities.append(
+            Quantity(key, value, float(np.hypot(error, level)), "N m", entry, sentence, wheel=wheel)
+        )
     return quantities, []
+
+
+def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: Spell) -> float:
+    """How much of the weight along a measured slope the driven wheels' ``torque`` (n, k) carries at a stop; NaN where it is level to three
+    standard deviations of a pitch sensor's zero, or no pitch is known."""
+    pitch = float(stop_means(windows.pitch[:, None], spell)[0])
+    if not abs(pitch) > 3 * _DEFAULT_PITCH:
+        return float("nan")
+    thrust = np.sum(stop_means(torque, spell) / vehicle.wheel_radius[vehicle.driven])
+    return float(thrust / (vehicle.mass * GRAVITY * np.sin(pitch)))
+
+
+def _released(stops: Sequence[Spell], shares: Mapping[Spell, float], holding: Sequence[Spell]) -> bool:
+    """Whether one of the stops is on a slope on which the torques do not hold the vehicle: they read their zeros then."""
+    return any(np.isfinite(shares[spell]) and spell not in holding for spell in stops)
 
 
 def _work(windows: Windows, torque: Floats) -> Floats:
