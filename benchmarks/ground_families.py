@@ -1,6 +1,6 @@
 """Changes and soils on development machines drawn at random: how many borders are found, what is false, how often a soil is named right.
 
-    python benchmarks/ground_families.py [--machines 24] [--seed 8240000] [--rate 20] [--minutes 10] [--write]
+    python benchmarks/ground_families.py [--machines 24] [--seed 8240000] [--rate 20] [--minutes 10] [--family development] [--write]
 
 One drive a machine over two to four soils that come again and again, estimated by the default method. A border counts where true
 resistance or true scale of the curve differ by three times their spread on one soil; others are neither found nor missed. A change counts
@@ -33,7 +33,7 @@ from terragrip.soil.estimates import GatheredRuns, whole_length
 from terragrip.soil.library import SoilLibrary
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/ground.md"
-BEGIN = "<!-- made by benchmarks/ground_families.py --write, {rate:g} Hz -->"
+BEGIN = "<!-- made by benchmarks/ground_families.py --write, {family}{rate:g} Hz -->"
 DIFFERS = 3.0
 LEAST_BLOCKS = 10
 SURE = 0.9
@@ -57,10 +57,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=8240000)
     parser.add_argument("--rate", type=float, default=20.0)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--family", choices=("development", "held-out"), default="development")
     parser.add_argument("--write", action="store_true", help="put the table into docs/ground.md")
     arguments = parser.parse_args()
     ways = {"afterwards": (Matches(), Named()), "while driving": (Matches(), Named())}
-    for kind, seed in machines("development", arguments.machines, arguments.seed):
+    for kind, seed in machines(arguments.family, arguments.machines, arguments.seed):
         result = draw(kind, seed, rate=arguments.rate, duration=60 * arguments.minutes)
         estimates = estimate(result.recording, result.vehicle)
         spans = list(borders(estimates, result))
@@ -71,7 +72,7 @@ def main() -> None:
             if library:
                 add_soils(named, estimates, library, half, settings)
     lines = [
-        f"{arguments.machines} machines from seed {arguments.seed}, {arguments.rate:g} Hz; "
+        f"{arguments.machines} {arguments.family} machines from seed {arguments.seed}, {arguments.rate:g} Hz; "
         f"soils of {len(ways['afterwards'][1].right)} of them.",
         "",
         "| way | borders | found (%) | changes right (%) | false an hour | soil right (%) | stated (%) | sure and wrong (%) "
@@ -87,7 +88,8 @@ def main() -> None:
         )
     print("\n".join(lines))
     if arguments.write:
-        put(DOCUMENT, BEGIN.format(rate=arguments.rate), "\n".join(lines))
+        family = "" if arguments.family == "development" else f"{arguments.family}, "
+        put(DOCUMENT, BEGIN.format(rate=arguments.rate, family=family), "\n".join(lines))
 
 
 def borders(estimates: Estimates, result: SimulationResult) -> Iterator[tuple[float, float, float, bool]]:
