@@ -15,6 +15,7 @@ from terragrip.ground.emissions import Emissions
 from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
 from terragrip.ground.unknown import CELLS
 from terragrip.soil.blocks import estimates_blocks
+from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.literature import literature_soils
 from terragrip.soil.signature import signature_in
@@ -191,6 +192,35 @@ def test_slip_that_is_not_known_leaves_the_soil_to_the_resistance(library):
     }
     ground, _ = analyse(replace(blind, columns={**blind.columns, **wide}), library)
     assert [section.soil for section in ground.sections] == ["grass"]
+
+
+def test_a_soil_without_a_curve_is_recognised_by_its_resistance(tmp_path):
+    """On wet ground the drives hold too little slip for a curve: left out of the library it would be unknown, or another soil."""
+    wet = Ground(0.8, 0.17, 0.008, 0.004, slip=0.012)
+    gathered = GatheredRuns()
+    for seed in (1, 2):
+        gathered.add(drive(seed, [("fine", FINE, 40)]), f"fine {seed}")
+        gathered.add(with_little_slip(drive(seed, [("wet", wet, 40)])), f"wet {seed}")
+    gathered.learn().library().write(tmp_path / "soils.json")
+    library = SoilLibrary.load(tmp_path / "soils.json")
+    assert list(library) == ["fine"]
+    assert list(library.not_fitted) == list(library.without_curve) == ["wet"]
+
+    table = with_little_slip(drive(9, [("wet", wet, 40)]))
+    ground = analyse(table, library)[0]
+    assert share(ground.timeline, "wet", "wet") > 0.9
+    assert any("holds no curve of wet" in note for note in ground.notes)
+    assert share(analyse(drive(9, [("fine", FINE, 40)]), library)[0].timeline, "fine", "fine") > 0.9
+
+
+def with_little_slip(estimates):
+    """The drive with slips of 1.2 % and noise of 3 %, which is stated."""
+    rng, rows = np.random.default_rng(len(estimates)), len(estimates)
+    columns = dict(estimates.columns)
+    for name in [n for n in columns if n.startswith("slip_")]:
+        noise = 0.03 * np.repeat(rng.standard_normal(rows // 20 + 1), 20)[:rows]
+        columns[name] = np.full(rows, 0.03) if name.endswith("_std") else 0.012 + noise
+    return replace(estimates, columns=columns)
 
 
 def test_slowly_driven_ground_counts_by_the_way():

@@ -66,7 +66,7 @@ def command(
     target = check_file(output, inputs, suffixes=(".json",))
     tables = _tables(table, estimates, [*inputs, output])
     known = SoilLibrary.load(library) if library else None
-    for soil in known.values() if known else ():
+    for soil in known.recognisable.values() if known is not None else ():
         signature_in(soil, library)
     settings, grounds = Settings(online, length, _signals(signal)), []
     with progress("ground", quiet) as step:

@@ -53,7 +53,7 @@ def analyse(
     blocks = estimates_blocks(estimates, file=run or None)
     length = whole_length(estimates.vehicle)
     changes = _changes(blocks, chosen, length / A_LENGTH)
-    emissions = Emissions(dict(library.soils) if library else {}, maker(estimates), length)
+    emissions = Emissions(library.recognisable if library is not None else {}, maker(estimates), length)
     forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
     probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
     timeline = Timeline(
@@ -61,7 +61,7 @@ def analyse(
     )
     stretches = _stretches(estimates, changes, timeline)
     sections = sections_of(estimates, stretches, length)
-    soils = _soils(timeline) if library else ()
+    soils = _soils(timeline) if emissions.soils else ()
     ground = Ground(
         run,
         float(estimates.time[0]),
@@ -142,15 +142,18 @@ def _notes(
 ) -> tuple[str, ...]:
     notes = list(emissions.notes)
     known = timeline.known
-    if library is not None and not library:
+    if library is not None and not emissions.soils:
         notes.append("The library holds no soil, so none is named.")
+    if library is not None and library.without_curve:
+        names = ", ".join(library.without_curve)
+        notes.append(f"The library holds no curve of {names}: recognised by resistance and roughness.")
     if not known.any():
         notes.append(
             "No stretch of the drive shows the ground: the vehicle stands or spins, or rows are flagged or lack values throughout."
         )
-    elif library and (timeline.soil[known] == UNKNOWN).all():
+    elif emissions.soils and (timeline.soil[known] == UNKNOWN).all():
         notes.append("No soil of the library fits any of the drive: all of it is unknown.")
-    elif library:
+    elif emissions.soils:
         share = float((timeline.soil[known] == UNKNOWN).mean())
         if share >= 0.01:
             notes.append(

@@ -62,7 +62,9 @@ class LiveGround:
         there = {"time", "event", *estimator.columns}
         self._columns = tuple(name for name in every if name in there)
         length = whole_length(estimator.vehicle)
-        self._emissions = Emissions(dict(library.soils) if library else {}, estimator.method, length)
+        self._emissions = Emissions(
+            library.recognisable if library is not None else {}, estimator.method, length
+        )
         self._filter = ForwardFilter.begin(self._emissions)
         self._changes = OnlineChanges(OnlineSettings(step=length / A_LENGTH))
         self._origin: float | None = None

@@ -18,7 +18,8 @@ from terragrip.soil.bins import BinSettings
 from terragrip.soil.blocks import Blocks, driven_wheels, estimates_blocks
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import Campaign, RunPairs, learn_soils, usable_pairs
-from terragrip.soil.signature import maker, with_signatures
+from terragrip.soil.library import Soil
+from terragrip.soil.signature import USUAL_CURVE, maker, with_signatures
 from terragrip.soil.transitions import settled
 
 if TYPE_CHECKING:
@@ -145,10 +146,14 @@ class GatheredRuns:
             common_slip_sd=self.slip_sd,
         )
         plain = {name: learned.soil for name, learned in campaign.soils.items()}
+        plain |= {name: Soil(name, "exponential", USUAL_CURVE) for name in campaign.not_fitted}
         signed = with_signatures(plain, self.blocks, " and ".join(sorted(self.makers)))
         learned = {name: replace(one, soil=signed[name]) for name, one in campaign.soils.items()}
-        doubts = doubts_of(zip(self.runs, self.notes, strict=True))
-        return replace(campaign, soils=learned, words=(*doubts, *campaign.words))
+        bare = {name: signed[name] for name in campaign.not_fitted if "signature" in signed[name].fit}
+        words = [*doubts_of(zip(self.runs, self.notes, strict=True)), *campaign.words]
+        if bare:
+            words.append(f"{', '.join(bare)}: recognised without a curve, by resistance and roughness.")
+        return replace(campaign, soils=learned, words=tuple(words), without_curve=bare)
 
 
 def zero_slip_sd(vehicle: Vehicle) -> float:

@@ -98,16 +98,18 @@ class LearnedSoil:
 
 @dataclass(frozen=True)
 class Campaign:
-    """All soils of a set of estimates: the fits, the soils without a fit and why, sentences for the user."""
+    """All soils of a set of estimates: the fits, the soils without a fit and why, sentences for the user; soils without a fit that can
+    be recognised all the same (`SoilLibrary.without_curve`)."""
 
     soils: Mapping[str, LearnedSoil]
     not_fitted: Mapping[str, str]
     words: tuple[str, ...]
+    without_curve: Mapping[str, Soil] = field(default_factory=dict)
 
     def library(self, provenance: Mapping[str, Any] | None = None) -> SoilLibrary:
         """As a soil library."""
         soils = {name: learned.soil for name, learned in self.soils.items()}
-        return SoilLibrary(soils, dict(provenance or {}), dict(self.not_fitted))
+        return SoilLibrary(soils, dict(provenance or {}), dict(self.not_fitted), dict(self.without_curve))
 
     def to_pandas(self) -> pd.DataFrame:
         """As `SoilLibrary.to_pandas`."""

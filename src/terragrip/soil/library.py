@@ -89,11 +89,16 @@ class Soil:
 
 @dataclass(frozen=True)
 class SoilLibrary(Mapping[str, Soil]):
-    """Soils by name, read from and written to soils.json. A mapping."""
+    """Soils by name, read from and written to soils.json. A mapping.
+
+    `not_fitted`: why a soil has no curve of its own. `without_curve`: such soils on a usual curve, with what the data tell besides
+    (resistance, roughness): for recognition alone.
+    """
 
     soils: Mapping[str, Soil]
     provenance: Mapping[str, Any] = field(default_factory=dict)
     not_fitted: Mapping[str, str] = field(default_factory=dict)
+    without_curve: Mapping[str, Soil] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Soil:
         return self.soils[name]
@@ -114,8 +119,19 @@ class SoilLibrary(Mapping[str, Soil]):
             raise InputError(f"two entries are named {twin}", file=file, hint="rename one") from None
         if not isinstance(data["soils"], dict):
             raise InputError("holds no 'soils'", file=file, hint="give a file written by 'terragrip soils'")
-        soils = {name: _soil(name, entry, file) for name, entry in data["soils"].items()}
-        return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {})
+        bare = data.get("without_curve") or {}
+        if not isinstance(bare, dict):
+            raise InputError("is not a mapping", file=file, place="without_curve")
+        soils, without = (
+            {name: _soil(name, entry, file, key) for name, entry in entries.items()}
+            for key, entries in (("soils", data["soils"]), ("without_curve", bare))
+        )
+        return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {}, without)
+
+    @property
+    def recognisable(self) -> dict[str, Soil]:
+        """All soils that a drive can be recognised on: those with a curve, then those without one."""
+        return {**self.soils, **{k: v for k, v in self.without_curve.items() if k not in self.soils}}
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write soils.json, whole or not at all. InputError if it cannot be written, or a number is NaN or infinite."""
@@ -133,6 +149,7 @@ class SoilLibrary(Mapping[str, Soil]):
             "version": VERSION,
             "soils": {name: soil.to_dict() for name, soil in self.soils.items()},
             "not_fitted": dict(self.not_fitted),
+            "without_curve": {name: soil.to_dict() for name, soil in self.without_curve.items()},
             "provenance": dict(self.provenance),
         }
 
@@ -165,9 +182,9 @@ class SoilLibrary(Mapping[str, Soil]):
         both = {**self.soils, **other.soils} if clash == "replace" else {**other.soils, **self.soils}
         order = [*self.soils, *(name for name in other.soils if name not in self.soils)]
         missed = {k: v for k, v in {**other.not_fitted, **self.not_fitted}.items() if k not in both}
-        return SoilLibrary(
-            {name: both[name] for name in order}, {**other.provenance, **self.provenance}, missed
-        )
+        without = {k: v for k, v in {**other.without_curve, **self.without_curve}.items() if k not in both}
+        provenance = {**other.provenance, **self.provenance}
+        return SoilLibrary({name: both[name] for name in order}, provenance, missed, without)
 
     def compare(self, other: SoilLibrary) -> list[dict[str, Any]]:
         """For each soil in both: the largest and the mean difference of mu over slips 5-60 %, and whether intervals of one model meet."""
@@ -208,8 +225,8 @@ def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def _soil(name: str, entry: Any, file: str) -> Soil:
-    place = f"soils.{name}"
+def _soil(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
+    place = f"{under}.{name}"
     model = entry.get("model") if isinstance(entry, dict) else None
     if not isinstance(model, str) or model not in CURVES:
         raise InputError(

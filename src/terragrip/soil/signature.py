@@ -26,6 +26,8 @@ LEAST_BLOCKS = 20
 """Fewest blocks (10 s) that a signature is learned from."""
 OFFSET = 0.05
 """mu at which the error about the curve is as much additive as proportional."""
+USUAL_CURVE = {"a": 0.85}
+"""Of the paper's prototype (eq. 8): what a soil without a curve of its own is compared with."""
 LEAST_SD = (0.005, 0.03)
 """Below this the ground of one soil does not vary from field to field: of rho_s, and of mu relative to its curve."""
 
