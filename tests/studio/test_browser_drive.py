@@ -112,6 +112,38 @@ def test_notes_of_the_estimates_are_shown(page: Any, served: Served, folder: Pat
         assert box["x"] + box["width"] <= width
 
 
+def test_a_log_with_a_date_is_read_by_the_clock(page: Any, served: Served, folder: Path) -> None:
+    whole = Estimates.read(folder / "estimates.parquet")
+    began = {"recording": {**whole.about["recording"], "time_zero": "2026-10-14T07:59:50+00:00"}}
+    replace(whole, about={**whole.about, **began}).write(folder / "dated.parquet")
+    open_drive(page, served, "dated.parquet")
+    box = page.locator(".u-over").first.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 40)  # 17 s on
+    page.wait_for_selector(".line:has-text('t 2026-10-14 08:00:0')")
+    page.wait_for_selector(".events .name:has-text('07:59:50.0')")
+
+
+def test_a_run_whose_wheels_have_other_names_is_seen_over_another(
+    page: Any, served: Served, folder: Path
+) -> None:
+    """It was in the legend, and nothing of it in the charts: its wheels could not be chosen."""
+    whole = Estimates.read(folder / "estimates.parquet")
+    names = {"rl": "hl", "rr": "hr", "fl": "vl", "fr": "vr"}
+
+    def german(column: str) -> str:
+        parts = column.split("_")
+        return "_".join(names.get(part, part) for part in parts)
+
+    replace(whole, columns={german(k): v for k, v in whole.columns.items()}).write(folder / "german.parquet")
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet&with=german.parquet&over=elapsed&panels=slip")
+    page.wait_for_selector(".chart:has-text('german hr')")
+    for wheel in ("hl", "hr"):
+        page.click(f".chip:text-is('{wheel}')")
+    page.wait_for_selector("#no-wheels:has-text('No wheel of german is chosen')")
+    page.click(".chip:text-is('vl')")
+    page.wait_for_selector(".chart:has-text('german vl')")
+
+
 def test_a_replaced_run_is_shown_anew_and_a_removed_one_is_said(
     page: Any, served: Served, folder: Path
 ) -> None:

@@ -149,6 +149,14 @@ def test_a_job_shows_the_command_line_that_does_the_same(
     )
     page.reload()  # who comes back finds what follows, not "once there are estimates"
     page.wait_for_selector("#next-soils")
+    page.wait_for_selector("#jobs .job")
+    (folder / "other.csv").write_bytes((folder / "day1.csv").read_bytes())
+    page.goto(f"{served.url}/#/start?log=other.csv")  # it listed the jobs of other logs
+    page.wait_for_selector("#wizard-go")
+    page.wait_for_function("() => document.getElementById('wizard-found').textContent")
+    assert page.is_hidden("#jobs")
+    page.goto(f"{served.url}/#/start?log=day1.csv")
+    page.wait_for_selector("#next-soils")
     assert page.inner_text("#see-estimate") == "See the drive: day1-estimates.parquet"
     table = Estimates.read(folder / "day1-estimates.parquet")
     kept = {name: rows for name, rows in table.columns.items() if not name.startswith("adhesion")}

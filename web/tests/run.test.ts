@@ -5,7 +5,7 @@ const WHEELS = ["rl", "rr"];
 const STATES = [...WHEELS.map((w) => `wheel_speed_${w}`), "ground_speed", ...WHEELS.map((w) => `adhesion_${w}`), "soil_resistance"];
 
 function run(method: string, columns: string[]): Run {
-  const nothing = { notes: [], version: "1-1", events: [], soils: [], ground: null, recording: null, measured: [] };
+  const nothing = { began: null, notes: [], version: "1-1", events: [], soils: [], ground: null, recording: null, measured: [] };
   return { ...nothing, rows: 9, start: 0, end: 1, distance: 2, columns, wheels: WHEELS, method, vehicle: "robot", radius: { rl: 0.2, rr: 0.2 } };
 }
 

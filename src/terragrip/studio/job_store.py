@@ -45,7 +45,7 @@ class Job:
 
     def to_dict(self) -> dict[str, Any]:
         """What a page may see of it."""
-        names = ("id", "kind", "title", "output", "state", "done", "total", "text", "command")
+        names = ("id", "kind", "title", "output", "state", "done", "total", "text", "words", "command")
         return {name: getattr(self, name) for name in names}
 
 

@@ -143,7 +143,7 @@ export class Across {
       const found = await tried(() => columns("drive/pairs", { path, x: x.column, y: y.column, start, end, axis: way.axis, version: run.version }, []));
       if (turn !== this.turn) return;
       const [time, across, up] = found?.data ?? [];
-      if (found && time && across && up) all.push({ time, x: across, y: up, of: found.of ?? found.count, color: this.layers.length > 1 ? runColor(i) : "muted", label: layer.label });
+      if (found && time && across && up) all.push({ time, x: across, y: up, of: found.of ?? found.count, color: this.layers.length > 1 ? runColor(i) : "muted", label: layer.label, run: layer.run });
     }
     const beyond = this.plane.show(all, { x, y, curve: this.wheel !== FREE });
     // its lines move all that is below, which a press may be on

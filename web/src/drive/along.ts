@@ -1,6 +1,7 @@
 /** What runs are drawn over: time as recorded, time since the start, distance driven; and the way between time and place on it. */
 
 import { get } from "../ui/api";
+import { lapse, timeAxis, type TimeAxis } from "../ui/clock";
 import { columns } from "../ui/columns";
 import type { Range } from "./gestures";
 import type { Run } from "./run";
@@ -76,6 +77,16 @@ export class Way {
     if (this.axis === "time") return place;
     if (this.axis === "elapsed") return place + this.run.start;
     return this.of("place", "time", place);
+  }
+
+  /** Marks of the axis where it is of minutes and hours, or of the time of day; null where it is one of plain numbers. */
+  get marked(): TimeAxis | null {
+    return this.axis === "distance" ? null : timeAxis(this.run, this.axis === "time");
+  }
+
+  /** A place on the axis, for the reader. */
+  said(place: number): string {
+    return this.axis === "distance" ? `${place.toFixed(2)} m` : lapse(this.run, place);
   }
 
   private of(from: keyof Points, to: keyof Points, at: number): number {

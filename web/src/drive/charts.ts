@@ -283,17 +283,25 @@ export class Charts {
   private options(panel: Panel, width: number, last: boolean): uPlot.Options {
     const log = panel.log !== undefined;
     const { unit } = AXES[this.axis];
+    const marked = this.main?.way.marked;
     const drawn = (plot: uPlot): Drawn[] => this.plots.find((one) => one.plot === plot)?.drawn ?? [];
     const axis = { stroke: color("muted"), grid: { stroke: color("grid"), width: 1 }, ticks: { stroke: color("grid"), width: 1 }, font: "11px system-ui, sans-serif" };
     return {
       width,
       height: this.height(),
-      padding: [6, 20, 0, 0],
+      padding: [6, marked ? 30 : 20, 0, 0], // half of the last mark
       legend: { show: false },
       cursor: { sync: { key: SYNC }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
       scales: { x: { time: false, range: () => this.range }, y: log ? { distr: 3, range: () => panel.log as Range } : { range: (plot) => this.upright(panel) ?? limits(extent(drawn(plot), this.range), panel) } },
       axes: [
-        { ...axis, size: 24, ticks: { ...axis.ticks, size: 4 }, gap: 3, values: (_, ticks) => ticks.map((v) => `${digits(v, 6)}${last ? ` ${unit}` : ""}`) },
+        {
+          ...axis,
+          size: 24,
+          ticks: { ...axis.ticks, size: 4 },
+          gap: 3,
+          ...(marked ? { splits: (plot: uPlot, _: number, low: number, high: number) => marked.marks(low, high, Math.max(plot.bbox.width / devicePixelRatio / 90, 2)) } : {}),
+          values: (_, at) => at.map((v, i) => (marked ? `${marked.text(v, (at[1] ?? v + 1) - (at[0] ?? v))}${last && !i ? marked.zone : ""}` : `${digits(v, 6)}${last ? ` ${unit}` : ""}`)),
+        },
         { ...axis, size: 52, space: 24, ...(log ? { splits: () => MARKS, filter: (_: uPlot, at: number[]) => at } : {}), values: (_, ticks) => ticks.map((v) => digits(v, 4)) },
       ],
       series: [{}, { paths: () => null, points: { show: false } }],

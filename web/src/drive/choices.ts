@@ -25,7 +25,7 @@ export function panelMenu(element: HTMLElement, panels: Panel[], shown: string[]
   );
 }
 
-/** Fill a group with a button a wheel; `change` gets those that are to be shown, in the run's order. */
+/** Fill a group with a button a wheel; `change` gets those that are to be shown, in the order of `wheels`. */
 export function wheelChips(element: HTMLElement, wheels: string[], chosen: string[], change: (wheels: string[]) => void): void {
   fill(
     element,

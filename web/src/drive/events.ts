@@ -1,7 +1,8 @@
 /** The list of a run's events: next, previous, and the explanation of each. */
 
 import { digits, fill, h } from "../ui/dom";
-import { EVENT_COLORS, type Event } from "./run";
+import { timeOfDay } from "../ui/clock";
+import { EVENT_COLORS, type Event, type Run } from "./run";
 
 /** Entries that the list shows; next and previous go through all. */
 const LISTED = 400;
@@ -28,7 +29,9 @@ export class EventList {
     );
   }
 
-  show(events: Event[]): void {
+  /** The events of a run; none without one. */
+  show(run: Run | null): void {
+    const events = run?.events ?? [];
     this.events = [...events].sort((a, b) => a.start - b.start);
     this.chosen = -1;
     this.count.textContent = events.length ? `${events.length}${events.length > LISTED ? `, ${LISTED} listed` : ""}` : "none";
@@ -39,7 +42,7 @@ export class EventList {
           "li",
           {},
           h("i", { class: `strip ${EVENT_COLORS[event.kind] ?? "ink"}`, "aria-hidden": "true" }),
-          h("button", { type: "button", class: "name", title: event.why, click: () => this.go(i) }, `${event.start.toFixed(1)} s  ${event.kind}${event.end > event.start ? `, ${digits(event.end - event.start, 2)} s` : ""}`),
+          h("button", { type: "button", class: "name", title: event.why, click: () => this.go(i) }, `${run && timeOfDay(run, event.start, 1)}  ${event.kind}${event.end > event.start ? `, ${digits(event.end - event.start, 2)} s` : ""}`),
         ),
       ),
     );

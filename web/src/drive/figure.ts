@@ -1,5 +1,6 @@
 /** The charts as a sheet: what is shown, with title, legend, units and the plot of one quantity over another. */
 
+import { lapse, moment } from "../ui/clock";
 import { digits } from "../ui/dom";
 import { DRY, type Ink, type Stroke } from "../ui/ink";
 import { LINE, legend, widthOf, type Sheet } from "../ui/sheet";
@@ -31,8 +32,9 @@ function head(wet: Ink | null, y: number, layers: Layer[], [low, high]: [number,
   const [main] = layers;
   if (!main) return y;
   const { title, unit } = AXES[charts.axis];
+  const shown = charts.axis === "time" ? `${moment(main.run, low)} to ${moment(main.run, high)}` : charts.axis === "elapsed" ? `${lapse(main.run, low)} to ${lapse(main.run, high)}` : `${digits(low, 6)} to ${digits(high, 6)} ${unit}`;
   ink.text(layers.map(({ path }) => path).join(", "), LEFT, y, color("ink"), "start", { bold: true });
-  ink.text(`${title} ${digits(low, 6)} to ${digits(high, 6)} ${unit}; ${main.run.vehicle}, method ${main.run.method}; shaded: 95 % intervals`, LEFT, y + LINE, color("muted"), "start");
+  ink.text(`${title} ${shown}; ${main.run.vehicle}, method ${main.run.method}; shaded: 95 % intervals`, LEFT, y + LINE, color("muted"), "start");
   const patch = (shade: string, height: number, alpha: number) => (to: Ink, x: number, at: number): void => to.area([x, at - height / 2, x + 20, at - height / 2, x + 20, at + height / 2, x, at + height / 2], color(shade), alpha);
   const soils = [...new Set(soilsOf(main.run).map(({ name }) => name))];
   const kinds = [...new Set(main.run.events.map(({ kind }) => kind))];
@@ -64,9 +66,11 @@ function drawChart(wet: Ink | null, y: number, charts: Charts, { panel, plot, dr
   const py = (v: number): number => foot - ((upright(v) - upright(least)) / (upright(most) - upright(least))) * HEIGHT;
   const box = { x: LEFT, y: top, width: WIDTH - LEFT - RIGHT, height: HEIGHT };
   ink.clipped(box, () => drawSpans(ink, layers[0], px, top, foot));
-  for (const x of ticks({ low, high }, 10)) {
+  const marked = layers[0]?.way.marked;
+  const marks = marked ? marked.marks(low, high, 10) : ticks({ low, high }, 10);
+  for (const x of marks) {
     ink.line([px(x), top, px(x), foot], { color: color("grid") });
-    ink.text(digits(x, 6), px(x), foot + 11, color("muted"), "middle");
+    ink.text(marked ? marked.text(x, (marks[1] ?? x + 1) - (marks[0] ?? x)) : digits(x, 6), px(x), foot + 11, color("muted"), "middle");
   }
   for (const v of panel.log ? MARKS : ticks({ low: least, high: most }, 4)) {
     ink.line([LEFT, py(v), WIDTH - RIGHT, py(v)], { color: color("grid") });
@@ -86,7 +90,7 @@ function drawChart(wet: Ink | null, y: number, charts: Charts, { panel, plot, dr
   ink.text(above, WIDTH - RIGHT - 4, top + 10, color("bad"), "end");
   ink.text(under, WIDTH - RIGHT - 4, foot - 10, color("bad"), "end");
   const { title, unit } = AXES[charts.axis];
-  if (last) ink.text(`${title} [${unit}]`, (LEFT + WIDTH - RIGHT) / 2, foot + 28, color("ink"), "middle");
+  if (last) ink.text(`${title} [${marked?.unit ?? unit}]`, (LEFT + WIDTH - RIGHT) / 2, foot + 28, color("ink"), "middle");
   return below;
 }
 

@@ -3,6 +3,7 @@
 import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
+import { moment } from "../ui/clock";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { oneAtATime, type Page } from "../ui/page";
@@ -132,7 +133,7 @@ export const page: Page = (main, { notices, query }) => {
   function takeUp(wanted: Layout): void {
     shown = wanted.panels;
     charts.uprights = { ...wanted.uprights };
-    const there = wanted.wheels.filter((wheel) => run?.wheels.includes(wheel));
+    const there = wanted.wheels.filter((wheel) => layers.some((layer) => layer.run.wheels.includes(wheel)));
     if (there.length) chosen = there;
     const own = wanted.formulas ?? [];
     formulas.keep([...formulas.all.filter(({ name }) => !own.some((one) => one.name === name)), ...own], null);
@@ -185,6 +186,7 @@ export const page: Page = (main, { notices, query }) => {
       if (layer) found.push(layer);
     }
     others = found.map((layer) => layer.path);
+    for (const { run } of found) if (!run.wheels.some((wheel) => chosen.includes(wheel))) chosen = [...chosen, ...run.wheels.slice(-2)];
     for (const other of others) seen.set(other, runs.get(other) ?? "");
     layers = [layers[0] ?? main, ...found];
     const names = shortNames(layers.map((layer) => layer.path));
@@ -192,7 +194,8 @@ export const page: Page = (main, { notices, query }) => {
     overlay.draw([...runs.keys()], path, others);
     for (const option of over.options) option.disabled = option.value === "time" && others.length > 0;
     over.value = axis;
-    fill(legend, legendOf(layers));
+    drawWheels();
+    fill(legend, legendOf(layers, chosen));
     await known();
     draw();
     if (whole) charts.zoom(charts.whole);
@@ -220,9 +223,10 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   function drawWheels(): void {
-    wheelChips(wheels, run?.wheels ?? [], chosen, (names) => {
+    wheelChips(wheels, [...new Set(layers.flatMap((layer) => layer.run.wheels))], chosen, (names) => {
       chosen = names;
       drawWheels();
+      fill(legend, legendOf(layers, chosen));
       draw();
     });
   }
@@ -246,12 +250,10 @@ export const page: Page = (main, { notices, query }) => {
     if (!again) chosen = found.wheels.slice(-2);
     const link = linked?.path === wanted ? linked : null;
     linked = null;
-    const named = link?.wheels?.filter((wheel) => found.wheels.includes(wheel)) ?? [];
-    if (named.length) chosen = named;
+    if (link?.wheels?.some((wheel) => found.wheels.includes(wheel))) chosen = link.wheels;
     choice.value = wanted;
-    list.show(found.events);
+    list.show(found);
     advice.of(wanted, found.version);
-    drawWheels();
     hover(null);
     await lay(others);
     if (link?.pair) across.show(layers, formulas.all, link.pair);
@@ -277,7 +279,7 @@ export const page: Page = (main, { notices, query }) => {
     layers = [];
     charts.clear(why);
     forgetSample();
-    list.show([]);
+    list.show(null);
     advice.of("", "");
     for (const one of [legend, wheels]) fill(one);
     across.show([], [], null);
@@ -314,7 +316,7 @@ export const page: Page = (main, { notices, query }) => {
       a: of("curve_a"),
       a_std: of("curve_a_std"),
     });
-    fill(details, described(found, during(run?.events, found.time)));
+    fill(details, described(found, during(run?.events, found.time), run));
   }
 
   function hover(time: number | null): void {
@@ -327,8 +329,9 @@ export const page: Page = (main, { notices, query }) => {
     const section = during(run.ground?.sections, time);
     const event = during(run.events, time);
     const recognised = section ? `recognised: ${section.soil} (${digits(100 * (section.probabilities[section.soil] ?? 0), 2)} %)` : "";
-    const far = axis === "time" ? "" : `${AXES[axis].title} ${(layers[0]?.way.place(time) ?? NaN).toFixed(2)} ${AXES[axis].unit}`;
-    readout.value = [`t ${time.toFixed(2)} s`, far, soil, recognised, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
+    const way = layers[0]?.way;
+    const far = axis === "time" || !way ? "" : `${AXES[axis].title} ${way.said(way.place(time))}`;
+    readout.value = [`t ${moment(run, time)}`, far, soil, recognised, event && `${event.kind}${event.why ? `: ${event.why}` : ""}`].filter(Boolean).join("   ");
   }
 
   charts.onCursor = hover;

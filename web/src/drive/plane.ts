@@ -3,6 +3,7 @@
 import { CanvasInk, type Ink } from "../ui/ink";
 import type { Samples } from "../fit/samples";
 import { View, ticks, type Range } from "../ui/view";
+import { timeOfDay, type Timed } from "../ui/clock";
 import { digits, h } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { withUnit } from "../ui/units";
@@ -30,6 +31,7 @@ export interface Quantity {
 
 /** Pairs of one run and their times, out of so many. */
 export interface Pairs {
+  run: Timed;
   time: ArrayLike<number>;
   x: ArrayLike<number>;
   y: ArrayLike<number>;
@@ -140,7 +142,7 @@ export class Plane {
     const { axes } = this;
     const [one] = this.all;
     const said = (short: string, { scale, unit }: Quantity, value: number | undefined): string => `${short} ${withUnit(digits((value ?? NaN) * scale), { name: unit })}`;
-    this.readout.value = i < 0 || !one || !axes ? "" : [said(axes.curve ? "s" : "→", axes.x, one.x[i]), said(axes.curve ? "µ" : "↑", axes.y, one.y[i]), `t ${(one.time[i] ?? NaN).toFixed(2)} s`].join("   ");
+    this.readout.value = i < 0 || !one || !axes ? "" : [said(axes.curve ? "s" : "→", axes.x, one.x[i]), said(axes.curve ? "µ" : "↑", axes.y, one.y[i]), `t ${timeOfDay(one.run, one.time[i] ?? NaN, 2)}`].join("   ");
     this.later();
   }
 

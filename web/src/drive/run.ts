@@ -1,5 +1,6 @@
 /** A run as the server describes it, and the panels that can be drawn of it. */
 
+import type { Timed } from "../ui/clock";
 import { unitNamed, type Kind } from "../ui/units";
 
 export interface Span {
@@ -22,10 +23,8 @@ export interface Section {
   probabilities: Record<string, number>;
 }
 
-export interface Run {
+export interface Run extends Timed {
   rows: number;
-  start: number;
-  end: number;
   /** How far it went [m]; null where it has no ground speed. */
   distance: number | null;
   columns: string[];

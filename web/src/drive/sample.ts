@@ -1,5 +1,6 @@
 /** Everything known of one sample, in words and tables. */
 
+import { moment, type Timed } from "../ui/clock";
 import { digits, h } from "../ui/dom";
 import { unitOf } from "../ui/units";
 import type { Event } from "./run";
@@ -14,7 +15,7 @@ export interface Sample {
   why: string[];
 }
 
-export function described(sample: Sample, event: Event | undefined): (HTMLElement | null)[] {
+export function described(sample: Sample, event: Event | undefined, run: Timed | null): (HTMLElement | null)[] {
   const names = Object.keys(sample.values).filter((name) => !name.endsWith("_std"));
   const measured = Object.entries(sample.measured);
   const spread = (name: string): string => {
@@ -23,7 +24,7 @@ export function described(sample: Sample, event: Event | undefined): (HTMLElemen
   };
   const value = (name: string, v: number | null | undefined, count: number): string => digits(typeof v === "number" ? v * unitOf(name).scale : v, count);
   return [
-    h("p", {}, h("strong", {}, `t = ${sample.time.toFixed(3)} s`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
+    h("p", {}, h("strong", {}, `t = ${run ? moment(run, sample.time, 3) : `${sample.time.toFixed(3)} s`}`), ` (row ${sample.row})`, sample.labels["soil"] ? `, ${sample.labels["soil"]}` : ""),
     sample.event ? h("p", { class: "bad" }, `${sample.event}${event?.why ? `: ${event.why}` : ""}`) : null,
     h("h3", {}, "Why µ changed"),
     ...sample.why.map((text) => h("p", { class: "why" }, text)),

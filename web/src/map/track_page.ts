@@ -7,6 +7,7 @@ import { address, read, written, type View } from "../drive/link";
 import { during, EVENT_COLORS, panelsOf, soilColor, type Run } from "../drive/run";
 import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
+import { moment } from "../ui/clock";
 import { columns, type Columns } from "../ui/columns";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
@@ -236,7 +237,7 @@ export const page: Page = (main, { notices, query }) => {
     const t = (track.data[0] as Float64Array)[i] as number;
     const v = track.data[3]?.[i];
     const event = eventAt(t);
-    readout.value = [`t ${t.toFixed(2)} s`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(run, t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
+    readout.value = [`t ${run ? moment(run, t) : ""}`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(run, t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
   }
 
   charts.onCursor = mark;

@@ -65,7 +65,7 @@ export class JobList {
     this.ended(job);
   }
 
-  private draw(): void {
+  draw(): void {
     const shown = [...this.jobs.values()].filter(this.listed).slice(-SHOWN).reverse();
     this.element.hidden = !shown.length;
     const elements = shown.map((job) => this.line(job));

@@ -52,7 +52,11 @@ export class LogPage {
     { notices }: Context,
     private log: string,
   ) {
-    this.jobs = new JobList(notices, (job) => void this.ended(job));
+    this.jobs = new JobList(
+      notices,
+      (job) => void this.ended(job),
+      (job) => job.state === "running" || job.state === "queued" || this.isOwn(job), // what runs delays this log's too
+    );
     const section = (id: string, title: string, body: HTMLElement): HTMLElement => h("section", { class: "step", "aria-labelledby": id }, h("h2", { id }, title), body);
     main.append(
       h("p", { class: "back" }, h("a", { href: "#/start" }, "← Folder")),
@@ -69,6 +73,7 @@ export class LogPage {
   private async open(): Promise<void> {
     await this.reload();
     for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) if (this.items.some((item) => item.path === job.output)) this.keep(job);
+    this.jobs.draw();
     this.methods = await tried(() => get<Methods>("methods"));
     const first = this.of("profile");
     const named = `${stemOf(this.log)}-profile.yaml`;
@@ -289,13 +294,18 @@ export class LogPage {
     ]);
   }
 
+  /** Whether a job reads this log or its estimates. */
+  private isOwn({ words }: Job): boolean {
+    return words.includes(this.log) || words.includes(this.estimates);
+  }
+
   /** What a job made of this log, now or before the page was opened; false where it made nothing of it. */
   private keep(job: Job): boolean {
     if (job.state !== "done") return false;
     if (job.kind === "estimate" && job.title === this.log) {
       this.estimates = job.output;
-      this.vehicle ||= this.of("vehicle").find((path) => job.command.includes(` --vehicle ${path} `)) ?? "";
-    } else if (this.estimates && job.command.includes(this.estimates)) this.made.set(job.kind, job.output);
+      this.vehicle ||= this.of("vehicle").find((path) => job.words[job.words.indexOf("--vehicle") + 1] === path) ?? "";
+    } else if (job.words.includes(this.estimates)) this.made.set(job.kind, job.output);
     else return false;
     return true;
   }

@@ -16,6 +16,8 @@ export interface Job {
   done: number;
   total: number;
   text: string;
+  /** Its command line, word by word. */
+  words: string[];
   /** What would do the same on a command line in the folder. */
   command: string;
 }

@@ -56,6 +56,7 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "rows": len(table),
             "start": float(table.time[0]) if len(table) else 0.0,
             "end": float(table.time[-1]) if len(table) else 0.0,
+            "began": None if table.start is None else table.start.isoformat(),
             "distance": _distance(studio, path),
             "columns": list(table.columns),
             "measured": [] if result is None else sorted(result[1].channels),
