@@ -8,12 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from terragrip.estimation.driveline import DrivenMachine
+from terragrip.estimation.driveline import DRIVEN, DrivenMachine
 from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
 from terragrip.vehicle import Vehicle
+
+_LEAPS = f"drive_torque_{DRIVEN} leaps"
+_ITS_ZERO = "its zero moved, or the signal was lost."
+_TAKEN = "a PTO or a pump took another part of the engine's, or the signal was lost."
 
 
 class ByEngine:
@@ -48,7 +52,12 @@ class ByEngine:
             columns = {**part.columns, **self.machine.completed(part.columns, self._waiting.popleft().std)}
             columns = {name: values for name, values in columns.items() if self.machine.shows(name)}
             about = {**part.about, "driveline": self.machine.to_dict()}
-            notes = tuple(n for n in part.notes if not n.startswith("There is no drawbar_force"))
+            notes = (
+                note.replace(_ITS_ZERO, _TAKEN) if note.startswith(_LEAPS) else note
+                for note in part.notes
+                if not note.startswith("There is no drawbar_force")
+                and not (self.machine.unknown_pto and note.startswith(_LEAPS))
+            )
             yield replace(
                 part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes)))
             )

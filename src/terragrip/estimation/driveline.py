@@ -56,13 +56,15 @@ def by_engine(channels: Collection[str], vehicle: Vehicle) -> bool:
 class DrivenMachine:
     """How a machine becomes one of driven wheels: ``original``, the ``channels`` of its log, how these give the ``engine``'s torque.
 
-    Where the drive train's speed alone is measured also that ``rim`` and the speed [m/s] below which it reads 0 (``dead_band``)."""
+    Where the drive train's speed alone is measured also that ``rim`` and the speed [m/s] below which it reads 0 (``dead_band``).
+    ``unknown_pto``: a PTO turned in that log, and the vehicle file does not say what it takes."""
 
     original: Vehicle
     channels: tuple[str, ...]
     engine: EngineTorque
     rim: Rim | None
     dead_band: float = 0.0
+    unknown_pto: bool = False
 
     @classmethod
     def of_log(cls, whole: Recording, vehicle: Vehicle, reference: SlipReference) -> DrivenMachine:
@@ -76,9 +78,12 @@ class DrivenMachine:
             source=whole.source,
         )
         turning = pto_turns(whole.time, whole.channels)
-        if vehicle.driveline.pto_power is None and turning.any():
+        unknown = vehicle.driveline.pto_power is None and bool(turning.any())
+        if unknown:
             engine = replace(engine, notes=(*engine.notes, _PTO.format(turning.mean())))
-        return cls(vehicle, tuple(whole.channels), engine, _drive(reference.rims), reference.dead_band)
+        return cls(
+            vehicle, tuple(whole.channels), engine, _drive(reference.rims), reference.dead_band, unknown
+        )
 
     @classmethod
     def of_file(

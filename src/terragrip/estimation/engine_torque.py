@@ -97,8 +97,8 @@ class EngineTorque:
 
 @dataclass(frozen=True)
 class DrivelineTorque:
-    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside (``shift``, a PTO of
-    unknown power); ``std`` (n,) [N m] of the value in that row, NaN where there is none; ``shift`` (n,): rows of a gear shift."""
+    """``torque`` (n,) [N m]: the sum over the driven wheels, NaN where it was not measured or is set aside (``shift``); ``std``
+    (n,) [N m] of the value in that row, NaN where there is none or a PTO takes an unknown part; ``shift`` (n,): rows of a gear shift."""
 
     torque: Floats
     std: Floats
@@ -140,7 +140,7 @@ def driveline_torque(
     torque = np.where(shift, np.nan, wheel_torque(into, ratio, driveline.efficiency))
     std = torque_spread(speed, ratio, driveline.efficiency, engine.std, power_std)
     std_held = held(time, np.where(np.isfinite(torque), std, np.nan))
-    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio + power), np.nan, std_held), shift)
+    return DrivelineTorque(torque, np.where(shift | ~np.isfinite(ratio + power_std), np.nan, std_held), shift)
 
 
 def pto_turns(time: Floats, channels: Mapping[str, Floats]) -> Bools:
@@ -152,15 +152,17 @@ def pto_turns(time: Floats, channels: Mapping[str, Floats]) -> Bools:
 
 
 def _taken(driveline: Driveline, turns: Bools) -> tuple[Floats, Floats]:
-    """Power (n,) [W] that does not go into the gears, and its SD: the accessories', and the PTO's where it ``turns`` (NaN: not known)."""
+    """Power (n,) [W] that does not go into the gears, and its SD, NaN where it is not known: the accessories', and the PTO's where it
+    ``turns``. An unknown one counts as none, for slip hardly depends on it."""
 
     def spread(power: float, std: float | None) -> float:
         return power / 2 if std is None else std
 
-    pto = np.nan if driveline.pto_power is None else driveline.pto_power
+    pto, given = driveline.pto_power or 0.0, driveline.pto_power is not None
     power = driveline.accessory_power + np.where(turns, pto, 0.0)
     own = spread(driveline.accessory_power, driveline.accessory_power_std)
-    return power, np.hypot(own, np.where(turns, spread(pto, driveline.pto_power_std), 0.0))
+    of_pto = spread(pto, driveline.pto_power_std) if given else np.nan
+    return power, np.hypot(own, np.where(turns, of_pto, 0.0))
 
 
 def held(time: Floats, values: Floats) -> Floats:
