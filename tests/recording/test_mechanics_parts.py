@@ -258,6 +258,7 @@ def test_what_a_wrong_scale_is_told_by() -> None:
         }
     )
     assert "are 0.033 times the force that moves 139 kg" in _scale_sentence(1 / 30, vehicle)
+    assert "A trailer whose drawbar_force is not in the log looks the same" in _scale_sentence(4.8, vehicle)
     assert "fall where" in _scale_sentence(-0.1, vehicle)
 
 
