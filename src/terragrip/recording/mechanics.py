@@ -304,7 +304,8 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     return (
         f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg in this way: check the "
         "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."
-        + " A trailer whose drawbar_force is not in the log looks the same." * (scale > 1)
+        + " A trailer whose drawbar_force is not in the log looks the same."
+        * (scale > 1)
     )
 
 

@@ -101,7 +101,9 @@ export class AdvicePanel {
     const rows: [string, string][] = [];
     if (best) {
       rows.push(["Best slip, 95 %", between(best)], ["Slip driven", slip(drive["slip"] ?? NaN)]);
-      rows.push(["Efficiency, driven → best", `${slip(drive["efficiency"] ?? NaN)} → ${slip(best.efficiency)}`]);
+    }
+    if (best && drive["efficiency"] !== undefined) {
+      rows.push(["Efficiency, driven → best", `${slip(drive["efficiency"])} → ${slip(best.efficiency)}`]);
       rows.push(["Pull, driven → best", `${pull(drive["net_traction"] ?? NaN)} → ${pull(best.net_traction)}`]);
     }
     if (power) rows.push(["Most pull power at", between(power)]);
@@ -118,7 +120,7 @@ export class AdvicePanel {
       h("table", {}, rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)))),
       soil.limits.map((text) => h("p", { class: "hint" }, text)),
       soil.actions.length ? h("ul", { class: "todo" }, soil.actions.map((one) => h("li", {}, h("strong", {}, one.what), ` ${gained(one)}${one.why}`))) : null,
-      soil.missing.length ? h("details", {}, h("summary", {}, "What is missing"), h("ul", {}, soil.missing.map((text) => h("li", {}, text)))) : null,
+      soil.missing.length ? h("details", { open: !soil.actions.length }, h("summary", {}, "What is missing"), h("ul", {}, soil.missing.map((text) => h("li", {}, text)))) : null,
     );
   }
 }
