@@ -81,7 +81,7 @@ def test_without_a_library_no_share_of_right_soils_is_told() -> None:
 def test_sections_carry_their_means_and_what_they_were_taken_for() -> None:
     section = ground_sections.section_points([ground(["fine"] * 9, ["fine"] * 9)])
     (table,) = only(section, Table)
-    assert table.rows == (("run 1, 0 to 2 s", "fine", "80 %", "wet", "0.120 ± 0.020", "0.330 ± 0.040", "–"),)
+    assert table.rows == (("run 1, 0 to 2 s", "fine", "80 %", "wet", "12.0 ± 2.0 %", "0.330 ± 0.040", "–"),)
     assert len(only(section, Picture)) == 1
 
 

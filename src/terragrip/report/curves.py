@@ -16,6 +16,7 @@ from terragrip.report.style import (
     INK,
     MUTED,
     ORANGE,
+    name_axis,
     new_figure,
     soil_color,
     styled,
@@ -100,7 +101,7 @@ def draw_fits(curves: Sequence[SoilCurves], columns: int = 2) -> str:
             plot.set_ylabel("adhesion µ [–]")
         for i, plot in enumerate(plots.flat[: len(curves)]):
             if i + columns >= len(curves):
-                plot.set_xlabel("slip s [–]")
+                name_axis(plot.xaxis, "slip s [%]")
                 plot.tick_params(labelbottom=True)
         figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=3 if wide else 4)
         return to_svg(figure)
@@ -129,13 +130,13 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
         ):
             if np.isfinite(at):
                 plot.plot([at], [height], marker, color=color, markersize=7)
-                sentence = f"largest {what}: {height:.2f} at {at:.0%} slip"
+                sentence = f"largest {what}: {height:.2f} at {100 * at:.0f} % slip"
                 plot.annotate(
                     sentence, (at, height), (9, 9), textcoords="offset points", color=INK, fontsize=9
                 )
         plot.set_xlim(0, 1)
         plot.set_ylim(0, 1.15 * max(peaks.adhesion[1], peaks.efficiency[1]))
-        plot.set_xlabel("slip s [–]")
+        name_axis(plot.xaxis, "slip s [%]")
         plot.set_ylabel("adhesion µ, efficiency η [–]")
         figure.legend(loc="outside upper left", ncols=4)
         return to_svg(figure)
@@ -156,7 +157,7 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
             left.plot([peaks.adhesion[0]], [peaks.adhesion[1]], "o", color=color, markersize=5)
             right.plot([peaks.efficiency[0]], [peaks.efficiency[1]], "s", color=color, markersize=5)
         for plot, label in ((left, "adhesion µ [–]"), (right, "tractive efficiency η [–]")):
-            plot.set_xlabel("slip s [–]")
+            name_axis(plot.xaxis, "slip s [%]")
             plot.set_ylabel(label)
             plot.set_xlim(0, 1)
             plot.set_ylim(bottom=0)

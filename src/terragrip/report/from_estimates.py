@@ -31,6 +31,7 @@ from terragrip.report import (
     work_sections,
 )
 from terragrip.report.blocks import Blocks, blocks_of
+from terragrip.report.clock import Clock
 from terragrip.report.field_work import parts_of
 from terragrip.report.ground_sections import WARNINGS
 from terragrip.report.page import Page, Section, Table, names, number
@@ -63,6 +64,7 @@ class _Summary:
     method: str
     events: str
     began: datetime | None
+    clock: Clock
 
     @property
     def driven(self) -> summary.Driven:
@@ -120,6 +122,7 @@ def report_of(
             hint="give estimates of a drive, not of a standstill",
         )
     main, together = shown[0], sorted(shown, key=lambda run: run.name)
+    clocks = {one.name: one.clock for one in summaries}
     comparisons: list[Comparison] = [c for run in together for c in compare(run)]
     page = Page(
         title,
@@ -132,9 +135,9 @@ def report_of(
             read.advice.section(),
             read.map.section(),
             *_worked(read.blocks),
-            ground_sections.recognised(grounds),
-            ground_sections.section_points(grounds),
-            ground_sections.events(grounds, happened),
+            ground_sections.recognised(grounds, clocks),
+            ground_sections.section_points(grounds, clocks),
+            ground_sections.events(grounds, happened, clocks),
             *(
                 [residuals.section(main), sections.methods(comparisons, [], main.method)]
                 if main.has_adhesion
@@ -284,6 +287,7 @@ def _summary(run: Run) -> _Summary:
         run.method,
         shares or "–",
         run.began + timedelta(seconds=float(run.time[0])) if run.began is not None else None,
+        run.clock,
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.report.clock import Clock
 from terragrip.report.operating_points import Cross, draw_crosses
 from terragrip.report.page import Picture, Section, Table, names, number, percent
 from terragrip.report.runs import label_stretches
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from terragrip.ground.events import Event
     from terragrip.ground.result import Ground, Timeline
 
+NO_CLOCKS: Mapping[str, Clock] = MappingProxyType({})
+"""Of runs that have none, times are seconds."""
 ALIKE = ("fine", "wet")
 """Soils that the paper could not distinguish: their shares are also given as one."""
 SHOWN = 2
@@ -32,8 +36,13 @@ ALIKE_LISTED = 3
 """Of a run's events of one kind for one reason so many are listed, the longest, and the rest in one row; warnings are all listed."""
 
 
-def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
-    """Probabilities of the soils over the drives, changes, and the confusion matrix where the recording names its soils."""
+def recognised(
+    grounds: Sequence[Ground], clocks: Mapping[str, Clock] = NO_CLOCKS, simulated: bool = False
+) -> Section:
+    """Probabilities of the soils over the drives, changes, and the confusion matrix where the recording names its soils.
+
+    `clocks`: of the runs, by name.
+    """
     title = "The ground"
     with_time = [ground for ground in grounds if len(ground.timeline.time) > 1]
     if not with_time:
@@ -53,7 +62,7 @@ def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
         strip = " The strip on top is the recording's own label, grey a transition." if labelled else ""
         picture = Picture(
             f"ground-{_stem(ground.run)}",
-            draw_probabilities(ground),
+            draw_probabilities(ground, clocks.get(ground.run, Clock())),
             f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground found in the estimates, "
             f"as dark as they are probable.{strip} Where two soils look alike, they share the probability.",
             f"Probabilities of soils over time in {ground.run}",
@@ -76,7 +85,9 @@ def recognised(grounds: Sequence[Ground], simulated: bool = False) -> Section:
     return Section("ground", title, tuple(prose), tuple(content))
 
 
-def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Section:
+def section_points(
+    grounds: Sequence[Ground], clocks: Mapping[str, Clock] = NO_CLOCKS, simulated: bool = False
+) -> Section:
     """Mean and SD of slip and adhesion of each section found, coloured by the soil it was taken for (the paper's last two figures)."""
     title = "Operating points of the sections found"
     crosses = [
@@ -108,11 +119,13 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
     )
     rows = tuple(
         (
-            f"{ground.run}, {number(one.start, 0)} to {number(one.end, 0)} s",
+            f"{ground.run}, {clocks.get(ground.run, Clock()).span(one.start, one.end)}",
             one.soil,
             percent(one.probabilities.get(one.soil), 0),
             one.label or "–",
-            f"{number(one.slip_mean)} ± {number(one.slip_std)}",
+            f"{number(100 * one.slip_mean, 1)} ± {percent(one.slip_std)}"
+            if one.slip_mean is not None
+            else "–",
             f"{number(one.adhesion_mean)} ± {number(one.adhesion_std)}",
             _sensor(one.measured),
         )
@@ -128,7 +141,11 @@ def section_points(grounds: Sequence[Ground], simulated: bool = False) -> Sectio
     return Section("sections", title, (), (picture, table))
 
 
-def events(grounds: Sequence[Ground], result: Mapping[str, Sequence[Event]] | None = None) -> Section:
+def events(
+    grounds: Sequence[Ground],
+    result: Mapping[str, Sequence[Event]] | None = None,
+    clocks: Mapping[str, Clock] = NO_CLOCKS,
+) -> Section:
     """What happened, with start, end and the reason in the user's words.
 
     found: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
@@ -154,9 +171,11 @@ def events(grounds: Sequence[Ground], result: Mapping[str, Sequence[Event]] | No
         return Section("events", title, (f"{counted}; none of half a second or more.",))
     prose = f"{counted}; listed are warnings, and the longest of what lasts half a second or more:"
     warned = [pair for pair in listed if pair[1].kind in WARNINGS]
-    others = _longest([pair for pair in listed if pair[1].kind not in WARNINGS])
+    others = _longest([pair for pair in listed if pair[1].kind not in WARNINGS], clocks)
     # Warnings are never crowded out by a row of outliers.
-    shown = [_event(run, one) for run, one in warned[:LISTED]] + others[: max(LISTED - len(warned), 0)]
+    shown = [_event(run, one, clocks) for run, one in warned[:LISTED]] + others[
+        : max(LISTED - len(warned), 0)
+    ]
     whole = len(warned) + len(others)
     caption = (
         "Events, with the reason for each."
@@ -171,13 +190,13 @@ def events(grounds: Sequence[Ground], result: Mapping[str, Sequence[Event]] | No
     )
 
 
-def _event(run: str, one: Event) -> tuple[str, ...]:
+def _event(run: str, one: Event, clocks: Mapping[str, Clock]) -> tuple[str, ...]:
     """A row of the table of events."""
     lasts = number(one.seconds, 1)
-    return f"{run}, {number(one.start, 1)} s", one.kind, lasts, one.why or "–"
+    return f"{run}, {clocks.get(run, Clock()).text(one.start, 1)}", one.kind, lasts, one.why or "–"
 
 
-def _longest(listed: Sequence[tuple[str, Event]]) -> list[tuple[str, ...]]:
+def _longest(listed: Sequence[tuple[str, Event]], clocks: Mapping[str, Clock]) -> list[tuple[str, ...]]:
     """Rows of the ALIKE_LISTED longest events of each run, kind and reason, in order of time, and one row for the others."""
     groups: dict[tuple[str, str, str], list[Event]] = {}
     for run, one in listed:
@@ -186,7 +205,7 @@ def _longest(listed: Sequence[tuple[str, Event]]) -> list[tuple[str, ...]]:
     for (run, kind, _), mine in groups.items():
         longest = sorted(mine, key=lambda one: (-round(one.seconds, 3), one.start))
         kept = longest if len(mine) <= ALIKE_LISTED + 1 else longest[:ALIKE_LISTED]
-        rows += [_event(run, one) for one in sorted(kept, key=lambda one: one.start)]
+        rows += [_event(run, one, clocks) for one in sorted(kept, key=lambda one: one.start)]
         if rest := longest[len(kept) :]:
             seconds = sum(one.seconds for one in rest)
             rows.append(
@@ -231,7 +250,7 @@ def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
     return table, f"{sentence}."
 
 
-def draw_probabilities(ground: Ground) -> str:
+def draw_probabilities(ground: Ground, clock: Clock = Clock()) -> str:  # noqa: B008
     """An SVG: stacked probabilities over time, changes as lines, the label's strip above."""
     timeline = ground.timeline
     soils = (
@@ -257,7 +276,7 @@ def draw_probabilities(ground: Ground) -> str:
         )
         plot.set_ylim(0, 1)
         plot.set_xlim(float(timeline.time[0]), float(timeline.time[-1]))
-        plot.set_xlabel("time [s]")
+        clock.mark(plot)
         plot.set_ylabel("probability")
         plot.grid(visible=False)
         handles = [

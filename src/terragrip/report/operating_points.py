@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.report.page import Table, number
+from terragrip.report.page import Table, number, percent
 from terragrip.report.runs import Run, label_stretches
-from terragrip.report.style import INK, new_figure, soil_color, styled, to_svg
+from terragrip.report.style import INK, name_axis, new_figure, soil_color, styled, to_svg
 from terragrip.soil.literature import paper_soils
 
 LEAST_ROWS = 100
@@ -100,7 +100,7 @@ def draw_crosses(crosses: Iterable[Cross], sources: Sequence[str], what: str) ->
             if any(cross.source == v for cross in shown)
         ]
         plot.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0))
-        plot.set_xlabel("slip s [–]")
+        name_axis(plot.xaxis, "slip s [%]")
         plot.set_ylabel(f"{what} [–]")
         return to_svg(figure)
 
@@ -117,7 +117,7 @@ def cross_table(crosses: Iterable[Cross], what: str) -> Table:
     for soil, kinds in by_soil.items():
         row = [soil, *(_spread(kinds.get(v)) for v in sources)]
         row += [_apart(kinds.get("estimated"), kinds.get(v)) for v in others]
-        row += [number(kinds[v].slip) if v in kinds else "–" for v in sources]
+        row += [percent(kinds[v].slip) if v in kinds else "–" for v in sources]
         rows.append(tuple(row))
     return Table(
         f"Mean ± SD of {what} and mean slip by soil."
@@ -128,7 +128,7 @@ def cross_table(crosses: Iterable[Cross], what: str) -> Table:
             "soil",
             *(named[v] for v in sources),
             *(f"est. − {named[v]}" for v in others),
-            *(f"s {v}" for v in sources),
+            *(f"slip {v}" for v in sources),
         ),
         tuple(rows),
     )

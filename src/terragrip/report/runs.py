@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.estimation.estimates import wheels_with
+from terragrip.report.clock import Clock
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -80,6 +81,11 @@ class Run:
             return datetime.fromisoformat(text) if text else None
         except ValueError:
             return None
+
+    @cached_property
+    def clock(self) -> Clock:
+        """How its times are read."""
+        return Clock(self.began, float(self.time[-1] - self.time[0]))
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:

@@ -24,6 +24,8 @@ from terragrip.report.timeline import Lane, timeline
 if TYPE_CHECKING:
     from terragrip.estimation.calibration import Calibration
 
+HARDLY = 5.0
+"""A row whose SD is so many times as wide as the median is hardly known, and does not set a plot's height."""
 WIDE = 0.3
 """SD of the online curve's scale beyond which it does not set the plot's height."""
 ZOOM_MARGIN = 20.0
@@ -54,11 +56,12 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
         f"Traction of wheel {wheel} over time in {run.name}: {sources}",
     )
     start, end, about = _zoom(run)
+    between = run.clock.span(start, end)
     near = Picture(
         f"traction-{run.name}-zoom",
         timeline(run, lanes, (start, end)),
-        f"The same from {start:.0f} to {end:.0f} s, around {about}.",
-        f"Traction of wheel {wheel} in {run.name}, zoomed to {start:.0f} to {end:.0f} s",
+        f"The same from {between}, around {about}.",
+        f"Traction of wheel {wheel} in {run.name}, zoomed to {between}",
     )
     scored = sensor_table(run)
     shown = (whole, near) if scored is None else (whole, near, scored)
@@ -69,11 +72,11 @@ def slip_and_resistance(run: Run) -> Section:
     """Slip of one wheel and soil resistance over time, with intervals and truth."""
     wheel = run.shown_wheel
     lanes = [
-        _lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]", never_stuck=True),
+        _lane(run, f"slip_{wheel}", f"slip s, {wheel} [%]", never_stuck=True),
         _lane(run, "soil_resistance", "soil resistance ρs [–]", never_stuck=True),
     ]
     sim = "Simulated run" if run.truth is not None else "Run"
-    off = " Where the vehicle is stuck, slip leaves the plot towards 1." if run.stuck.any() else ""
+    off = " Where the vehicle is stuck, slip leaves the plot towards 100 %." if run.stuck.any() else ""
     picture = Picture(
         f"slip-resistance-{run.name}",
         timeline(run, lanes),
@@ -233,11 +236,12 @@ def _lane(
 ) -> Lane:
     """A lane of one estimated column, its axis wide enough for nearly all that it shows.
 
-    The rarest 0.3 % at either end may leave the plot, so may what stands still (there the interval may span
-    everything) and, with `never_stuck`, what happens while stuck.
+    The rarest 0.3 % at either end may leave the plot, so may what stands still, what is hardly known, as just before a standstill (there
+    the interval may span everything) and, with `never_stuck`, what happens while stuck.
     """
     estimate, std, truth = run.estimated(column), run.estimated(f"{column}_std"), run.true(column)
     rows = run.moving & ~run.stuck if never_stuck else run.moving
+    rows = rows & ~(std > HARDLY * np.nanmedian(np.append(std[rows], np.nan)))
     sources = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
     known = [v[rows & np.isfinite(v)] for v in sources if v is not None]
     ends = [np.percentile(v, [0.3, 99.7]) for v in known if len(v)]

@@ -11,7 +11,7 @@ from terragrip.estimation.rims import DRIVE, calibrated_scale
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.page import Picture, Section, Table, names, number
 from terragrip.report.runs import Run
-from terragrip.report.style import ESTIMATED, INK, new_figure, styled, to_svg
+from terragrip.report.style import ESTIMATED, INK, name_axis, new_figure, styled, to_svg
 from terragrip.report.timeline import Lane, timeline
 
 _POINTS = 2000
@@ -28,7 +28,7 @@ def of(run: Run) -> tuple[Section, ...]:
 
 def over_time(run: Run) -> Section:
     """Slip of each wheel, and the speeds that it comes from."""
-    lanes = [_lane(run, f"slip_{wheel}", f"slip s, {wheel} [–]") for wheel in run.wheels]
+    lanes = [_lane(run, f"slip_{wheel}", f"slip s, {wheel} [%]") for wheel in run.wheels]
     lanes.append(_lane(run, "ground_speed", "ground speed [m/s]"))
     wheels = names(
         [f"wheel {wheel}" if wheel != DRIVE else "the driven wheels as one" for wheel in run.wheels]
@@ -91,7 +91,7 @@ def histogram(run: Run) -> Section:
         )
         plot.stairs(100 * share, edges, fill=True, color=ESTIMATED, alpha=0.6, linewidth=0)
         plot.axvline(0.0, color=INK, linewidth=0.7)
-        plot.set_xlabel(f"slip s, {wheel} [–]")
+        name_axis(plot.xaxis, f"slip s, {wheel} [%]")
         plot.set_ylabel("share of the distance [%]")
         drawn = to_svg(figure)
     median, ninety = _weighted(slip, way, 0.5), _weighted(slip, way, 0.9)
@@ -104,7 +104,11 @@ def histogram(run: Run) -> Section:
     )
     parts, _ = np.histogram(np.clip(slip, _EDGES[0], _EDGES[-1]), bins=_EDGES, weights=way)
     rows = tuple(
-        (f"{100 * a:.0f} to {100 * b:.0f} %", number(metres, 0), f"{number(100 * metres / way.sum(), 1)} %")
+        (
+            f"{number(100 * a, 0)} to {number(100 * b, 0)} %",
+            number(metres, 0),
+            f"{number(100 * metres / way.sum(), 1)} %",
+        )
         for a, b, metres in zip(_EDGES, _EDGES[1:], parts, strict=False)
         if metres > 0
     )

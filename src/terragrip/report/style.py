@@ -25,6 +25,7 @@ from terragrip.figures import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 __all__ = [
@@ -68,6 +69,13 @@ WIDEST = 750.0
 """Points of a figure that would fill a sheet's width: one of 9.6 inches leaves room for a second below it."""
 PAGE_SCALE = 1.52
 """Pixels of a page that a point of a figure may grow to: 9.6 inches fill the text's width."""
+
+
+def name_axis(axis: Axis, label: str) -> None:
+    """Name an axis; of a share whose label ends in [%] the marks are per cents, the data stay shares."""
+    axis.set_label_text(label)
+    if label.endswith("[%]"):
+        axis.set_major_formatter(lambda share, _: f"{round(100 * share, 6):g}".replace("-", "−"))
 
 
 def to_svg(figure: Figure) -> str:

@@ -17,6 +17,7 @@ from terragrip.report.style import (
     MEASURED,
     MUTED,
     TRUE,
+    name_axis,
     new_figure,
     soil_color,
     styled,
@@ -75,8 +76,8 @@ def timeline(run: Run, lanes: list[Lane], window: tuple[float, float] | None = N
             borderaxespad=0.0,
             handlelength=1.6,
         )
-        plots[-1].set_xlabel("time [s]")
         plots[-1].set_xlim(float(run.time[rows][0]), float(run.time[rows][-1]))
+        run.clock.mark(plots[-1])
         return to_svg(figure)
 
 
@@ -150,7 +151,7 @@ def _draw_lane(plot: Axes, time: Floats, lane: Lane, rows: Bools) -> None:
     plot.plot(*slots(time, lane.estimate[rows]), color=ESTIMATED, label="estimate")
     if lane.truth is not None:
         plot.plot(*slots(time, lane.truth[rows]), color=TRUE, linewidth=0.8, label=lane.reference)
-    plot.set_ylabel(lane.label)
+    name_axis(plot.yaxis, lane.label)
     if lane.limits is not None:
         plot.set_ylim(*lane.limits)
 

@@ -8,7 +8,18 @@ from terragrip.arrays import Floats
 from terragrip.recording.window_means import window_means
 from terragrip.report.page import Picture, Section, Table, number
 from terragrip.report.runs import Run
-from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled, to_svg
+from terragrip.report.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    name_axis,
+    new_figure,
+    styled,
+    to_svg,
+)
 
 _COLORS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, SKY)
 _DASHES = ("-", "--", "-.", ":")
@@ -16,7 +27,7 @@ _DASHES = ("-", "--", "-.", ":")
 SLOTS = 240
 """Means over time that a line is drawn with."""
 _UNSURE = 0.15
-QUANTITIES = (("slip", "slip s [–]"), ("adhesion", "adhesion µ [–]"))
+QUANTITIES = (("slip", "slip s [%]"), ("adhesion", "adhesion µ [–]"))
 
 
 def look(k: int) -> tuple[str, str]:
@@ -54,8 +65,8 @@ def draw(run: Run, shown: list[tuple[str, str]]) -> str:
                     label=wheel,
                     linewidth=1.4,
                 )
-            plot.set_ylabel(label)
-        plots[-1].set_xlabel("time [s]")
+            name_axis(plot.yaxis, label)
+        run.clock.mark(plots[-1])
         plots[0].legend(
             loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=8, borderaxespad=0.0, handlelength=2.6
         )
