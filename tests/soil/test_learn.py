@@ -9,7 +9,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.bins import BinSettings, bin_pairs
+from terragrip.soil.bins import PULL, BinSettings, bin_pairs
 from terragrip.soil.choice import compare_forms
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.known import known_soils
@@ -165,13 +165,20 @@ def test_what_sorting_by_pull_changes_is_said_where_it_is_much(variation, said):
     assert any(one.startswith(words) for one in campaign.words) == said
 
 
-def test_few_pulls_are_sorted_by_slip():
-    campaign = learn_soils(
-        usable_pairs(table(1, upper=0.3), WHEELS, 2.6, "run"),
-        AdhesionCurve(bins=BinSettings(by="pull", metres=15)),
-    )
-    assert campaign.soils["fine"].curve is campaign.soils["fine"].by_slip
-    assert any("of 4 needed" in words for words in campaign.words)
+def test_two_pulls_make_a_curve():
+    """Noise of slip in the bins by slip made one a third as high, and sure of it."""
+    two = [
+        replace(part, slip=slip, adhesion=mu, pull=mu)
+        for part in light_work(noise=0.03)
+        for level in [np.repeat([0.022, 0.028], part.slip.size // 2)]
+        for slip, mu in [
+            (part.slip - part.slip.mean() + level, CURVES["exponential"].value(level, {"a": 0.9}))
+        ]
+    ]
+    curve = learn_soils(two).soils["field"].curve
+    assert curve.bins_.settings.by == "pull"
+    assert np.count_nonzero(curve.bins_.used) < 4
+    assert curve.parameters_["a"] == pytest.approx(0.9, rel=0.1)
 
 
 def test_no_labels():
@@ -279,9 +286,7 @@ def test_slips_that_end_below_the_papers_first_bin_are_sorted_by_slip_in_the_bin
 
 def test_an_error_of_zero_slip_is_stored_only_with_the_interval_that_holds_it():
     """Advice takes the stored error off its own: without an interval it came out too narrow."""
-    few = learn_soils(
-        light_work(), AdhesionCurve(bins=BinSettings(by="pull"), bootstrap=0), common_slip_sd=0.01
-    )
+    few = learn_soils(light_work(), AdhesionCurve(bins=PULL, bootstrap=0), common_slip_sd=0.01)
     assert "common_slip_sd" not in few.soils["field"].soil.to_dict()
     many = learn_soils(light_work(), common_slip_sd=0.01)
     assert many.soils["field"].soil.to_dict()["common_slip_sd"] == 0.01

@@ -13,7 +13,7 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.html import html_notes
 from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, PULL, Bins, BinSettings, bin_pairs
-from terragrip.soil.choice import FORMS, LEAST_BINS, FormVerdict, compare_forms
+from terragrip.soil.choice import FORMS, FormVerdict, compare_forms
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.identifiability import moved_by_noise
 from terragrip.soil.library import Soil, SoilLibrary
@@ -177,7 +177,7 @@ def learn_soils(
 
     `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's shape on bins by pull). `bins` by soil; default the
     curve's, on grass the paper's range up to 40 %. Bins by slip replace bins by pull where adhesion falls within the bins (beyond the
-    maximum one pull has two slips) or too few bins are filled; a note says so. `mass` [kg] gives the pulls of
+    maximum one pull has two slips); a note says so. `mass` [kg] gives the pulls of
     the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals, and so does
     `common_slip_sd`, the SD of slip's.
     Raises InputError if no pair is labelled.
@@ -303,25 +303,19 @@ def _learn(
 def _fits(
     parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins
 ) -> tuple[AdhesionCurve, AdhesionCurve]:
-    """The fit that counts and the paper's by slip, which may be one.
-
-    Raises InputError with too few slips, or no fit.
-    """
-    why = "the curve falls within the bins, so that one pull has two slips"
+    """The fit that counts and the paper's by slip, which may be one. Raises InputError with too few slips or pulls, or no fit."""
     steady = [part.steady for part in parts]
     if template.bins.by == BY_PULL and not (
         _falls(sorted_by_slip) and _falls(bin_parts(steady, sorted_by_slip.settings))
     ):
-        try:
-            curve = explaining(template.unfitted().fit_bins(_enough(bin_parts(parts, template.bins))))
-        except InputError as error:
-            why = error.problem
-        else:
-            return curve, _beside(curve, sorted_by_slip)
-    paper = template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip)
+        curve = explaining(template.unfitted().fit_bins(bin_parts(parts, template.bins)))
+        return curve, _beside(curve, sorted_by_slip)
+    paper = explaining(template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip))
     if template.bins.by == BY_PULL:
-        paper.notes_.append(f"Sorted by slip, not by pull: {why}.")
-    return explaining(paper), paper
+        paper.notes_.append(
+            "Sorted by slip, not by pull: the curve falls within the bins, so that one pull has two slips."
+        )
+    return paper, paper
 
 
 def _beside(curve: AdhesionCurve, sorted_by_slip: Bins) -> AdhesionCurve:
@@ -371,16 +365,6 @@ def _falls(bins: Bins) -> bool:
         AdhesionCurve(model, intercept=intercept, bootstrap=0).fit_bins(bins).predict(bins.slip[bins.used])
     )
     return bool(values.max() - values[-1] > FALL * abs(values.max()))
-
-
-def _enough(bins: Bins) -> Bins:
-    """The bins by pull. Raises InputError where there are fewer than LEAST_BINS."""
-    filled = int(np.count_nonzero(bins.used))
-    if filled < LEAST_BINS:
-        raise InputError(
-            f"the pulls fill {filled} bin{'s' * (filled != 1)} with {bins.settings.least_text}, of {LEAST_BINS} needed"
-        )
-    return bins
 
 
 def explaining(curve: AdhesionCurve) -> AdhesionCurve:
