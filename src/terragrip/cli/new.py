@@ -112,6 +112,12 @@ def vehicle(
             metavar="VALUE", help="Standard deviation of the ground's slope, where no pitch is measured."
         ),
     ] = None,
+    acceleration_bias: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE", help="Standard deviation of an accelerometer's zero, mounting included."
+        ),
+    ] = None,
     known_classes: Annotated[
         bool,
         typer.Option(
@@ -146,6 +152,7 @@ def vehicle(
         "drive_torque_offset": drive_torque_offset,
         "drawbar_offset": drawbar_offset,
         "slope": slope,
+        "acceleration_bias": acceleration_bias,
     }
     from terragrip.vehicle_maker import TORQUE_AT, make
 

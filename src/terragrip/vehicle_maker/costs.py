@@ -13,6 +13,7 @@ from terragrip.vehicle_maker.drive import drive
 from terragrip.vehicle_maker.fields import fields
 from terragrip.vehicle_maker.maker import Made, vehicle_of
 
+_UNSEEN = "acceleration_bias"  # of a sensor that the machine on paper does not have
 QUANTITIES = ("slip", "adhesion", "soil_resistance", "net_traction")
 
 
@@ -34,7 +35,7 @@ def interval_costs(made: Made) -> tuple[Cost, ...]:
     """
     if made.signals == "bus-speed":
         return _bus_costs(made)
-    asked = fields(made.machine, made.signals, made.known)
+    asked = [one for one in fields(made.machine, made.signals, made.known) if one.name != _UNSEEN]
     true = vehicle_of(made.machine, "torque", made.known, ())
     recording = drive(true, made.machine.speed, made.signals, tows=made.machine.tows)
     spreads = {field.name for field in asked if field.is_spread}
@@ -45,7 +46,11 @@ def interval_costs(made: Made) -> tuple[Cost, ...]:
         return _half_widths(estimate(recording, vehicle))
 
     found = [Cost("all is known and calibrated", "", widths([], numbers))]
-    alone = [Cost(field.assumption, field.name, widths([field.name], numbers)) for field in made.assumed]
+    alone = [
+        Cost(field.assumption, field.name, widths([field.name], numbers))
+        for field in made.assumed
+        if field.name != _UNSEEN
+    ]
     alone += [
         Cost(
             f"{field.name}: ± {made.known[field.name]:g} {field.unit}",

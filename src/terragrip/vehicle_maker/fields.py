@@ -80,6 +80,7 @@ _SPREADS: tuple[tuple[str, str, str], ...] = (
     ("drive_torque_offset", "error of the torques' zero, standard deviation", "N m"),
     ("drawbar_offset", "error of the drawbar force's zero, standard deviation", "N"),
     ("slope", "slope of the ground where no pitch is measured, standard deviation", "rad"),
+    ("acceleration_bias", "error of an accelerometer's zero, mounting included, standard deviation", "m/s^2"),
 )
 
 

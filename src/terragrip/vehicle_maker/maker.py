@@ -136,7 +136,7 @@ def vehicle_of(
             "wheel_radius": RADIUS_BY_TAPE,
             "drive_torque_gain_common": float(np.hypot(scale, RADIUS_BY_TAPE)),
         }
-    for field in ("drive_torque_gain", "drive_torque_offset", "drawbar_offset", "slope"):
+    for field in ("drive_torque_gain", "drive_torque_offset", "drawbar_offset", "slope", "acceleration_bias"):
         share = (
             known.get(field, typical[field].value if field in doubted else 0.0) if field in typical else 0.0
         )
