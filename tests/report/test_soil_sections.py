@@ -62,6 +62,12 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
     assert float(row["R²: ours, by pull"]) > 0.97
 
 
+def test_soils_beside_each_other_are_drawn_whole(curves: list[SoilCurves]) -> None:
+    """The first soil's height cut those of firmer ground."""
+    hard, fine = curves
+    assert ">0.7</text>" in draw_fits([fine, hard])
+
+
 def test_a_fit_that_is_a_hint_only_does_not_look_the_surest(curves: list[SoilCurves]) -> None:
     """Elsewhere than in the paper, and without an interval: no columns of dashes, a dotted line, and it is said at each number."""
     hints = [replace(one, name=f"soil{i}", paper=None, learned=_guessed(one)) for i, one in enumerate(curves)]

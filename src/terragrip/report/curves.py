@@ -93,6 +93,8 @@ def draw_fits(curves: Sequence[SoilCurves], columns: int = 2) -> str:
         named: dict[str, Any] = {}
         for plot, curve in zip(plots.flat, curves, strict=False):
             named |= _draw_fit(plot, curve)
+        for plot in plots.flat[: len(curves)]:  # before all are drawn it would keep the height of the first
+            plot.set_ylim(bottom=0)
             if wide:
                 plot.set_title(curve.name)
         for plot in plots.flat[len(curves) :]:
@@ -196,7 +198,6 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
         if values is not None:
             (named[label],) = plot.plot(SLIPS, values, **style)
     plot.set_xlim(0, SLIPS[-1])
-    plot.set_ylim(bottom=0)
     return named
 
 
