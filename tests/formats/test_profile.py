@@ -446,6 +446,8 @@ def test_a_frame_is_a_log_too() -> None:
         read(own, profile)
     with pytest.raises(InputError, match="several profiles for one table"):
         read(own, [profile, profile])
+    with pytest.raises(InputError, match="a dict is no profile; give a path, or tg"):
+        read("log.csv", {"channels": {"ground_speed": "v"}})  # type: ignore[arg-type]
 
 
 def test_a_pattern_without_a_column_names_the_channel_and_not_what_it_leaves_out(

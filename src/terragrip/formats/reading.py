@@ -46,6 +46,8 @@ def read(
 
     Raises InputError with file, column, row and hint if the log is unusable.
     """
+    if isinstance(profile, Mapping):
+        raise InputError("a dict is no profile", hint="give a path, or tg.Profile.from_dict(...) of it")
     if isinstance(path, Mapping) or hasattr(path, "columns"):
         return _of_frame(path, profile)
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
