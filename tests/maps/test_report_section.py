@@ -25,7 +25,7 @@ def test_the_map_is_drawn_and_its_patches_are_listed() -> None:
     (row,) = table.rows
     assert row[0] == "adhesion"
     assert float(row[1]) == pytest.approx(51.0 + np.degrees(10 / 6378137.0), abs=2e-5)
-    assert row[6].startswith("-")
+    assert row[6].startswith("−")
 
 
 def test_impossible_positions_leave_the_map_out_with_the_reason() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terragrip.maps.field_map import FieldMap
-from terragrip.maps.values import QUANTITIES
+from terragrip.maps.values import QUANTITIES, SHARES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +36,11 @@ def picture(made: FieldMap) -> Figure:
         title = QUANTITIES[quantity]
         if quantity == "adhesion":
             title = title.replace("the reference slip", f"{100 * made.reference_slip:g} % slip")
-        _panel(line[0], made, cells.column, cells.row, cells.value, corner, "viridis", title)
-        _panel(line[1], made, cells.column, cells.row, cells.std, corner, "cividis", "its standard deviation")
+        scale, deviation = 1.0, "its standard deviation"
+        if quantity in SHARES:
+            scale, title, deviation = 100.0, title.replace("[-]", "[%]"), f"{deviation} [%]"
+        _panel(line[0], made, cells.column, cells.row, scale * cells.value, corner, "viridis", title)
+        _panel(line[1], made, cells.column, cells.row, scale * cells.std, corner, "cividis", deviation)
         for one in made.anomalies.get(quantity, []):
             x, y = one.column * made.cell - corner[0], one.row * made.cell - corner[1]
             size = np.sqrt(len(one.cells) / np.pi) * made.cell + made.cell

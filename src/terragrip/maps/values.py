@@ -31,6 +31,8 @@ QUANTITIES: Mapping[str, str] = {
     "efficiency": "tractive efficiency of the driven wheels [-]",
 }
 """Name and meaning of what is mapped."""
+SHARES = ("slip", "efficiency")
+"""Those that readers get in per cent; files have ratios."""
 COUNTED = ("", "immobilization")
 """Events whose rows count: a wet hole is where the warning is given."""
 WIDEST_STD = 0.5

@@ -84,6 +84,8 @@ def _drawn(made: FieldMap) -> Picture:
 def _anomalies(made: FieldMap) -> Sequence[Table]:
     from pyproj import Transformer
 
+    from terragrip.maps.values import SHARES
+
     back = Transformer.from_crs(made.epsg, 4326, always_xy=True)
     rows = []
     every = sorted(
@@ -91,9 +93,12 @@ def _anomalies(made: FieldMap) -> Sequence[Table]:
     )
     for name, one in every[:ROWS]:
         longitude, latitude = back.transform(one.column * made.cell, one.row * made.cell)
+        scale, digits, unit = (100.0, 1, " %") if name in SHARES else (1.0, 3, "")
+        value, around, apart = (number(scale * v, digits) for v in (one.value, one.around, one.difference))
+        plus = "+" * (one.difference > 0)
         rows.append((
             name.replace("_", " "), f"{latitude:.6f}", f"{longitude:.6f}", number(len(one.cells) * made.cell**2, 0),
-            number(one.value, 3), number(one.around, 3), f"{one.difference:+.3f} ± {1.96 * one.std:.3f}",
+            f"{value}{unit}", f"{around}{unit}", f"{plus}{apart} ± {number(1.96 * scale * one.std, digits)}{unit}",
         ))  # fmt: skip
     if not rows:
         return ()

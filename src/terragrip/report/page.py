@@ -141,7 +141,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def percent(share: float | None, digits: int = 1) -> str:
     """A share of one as per cent."""
-    return "–" if share is None or share != share else f"{100 * share:.{digits}f} %"
+    return "–" if share is None or share != share else f"{number(100 * share, digits)} %"
 
 
 def names(words: Sequence[str]) -> str:
