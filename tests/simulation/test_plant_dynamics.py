@@ -231,3 +231,13 @@ def test_stiff_start_from_rest_stays_stable(quiet, drive):
     assert np.abs(np.diff(coarse["wheel_speed"], axis=0)).max() < 0.02
     np.testing.assert_allclose(coarse["wheel_speed"], fine["wheel_speed"], atol=5e-3)
     np.testing.assert_allclose(coarse["speed"], fine["speed"], atol=5e-4)
+
+
+def test_wheels_that_stop_past_the_peak_do_not_chatter(quiet, drive):
+    """Where wheels lose their grip and stop, the recorded acceleration is that of the speed."""
+    falling = {"even": {"curve": {"name": "burckhardt", "c1": 0.7, "c2": 30, "c3": 0.3}, "resistance": 0.05}}
+    tool = {"mass": 60, "length": 2.0, "dig_in": 650}
+    scenario = quiet(soils=falling, tools=[tool], speed=[[0, 0], [1, 0.6], [5, 0.6], [6, 0]], duration=8)
+    trace = drive(scenario, stride=5)
+    followed = np.cumsum(trace["acceleration"]) * 0.005
+    assert np.abs(followed - trace["speed"]).max() < 0.05

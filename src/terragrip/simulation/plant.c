@@ -5,6 +5,10 @@
 
 /* 1 - 1/sqrt(2): L-stable. */
 #define GAMMA 0.29289321881345254
+#define CLOSE 0.02 /* of the slip floor: error of a rim speed in one step */
+#define HALVINGS 5
+#define CLOSE 0.02 /* of the slip floor: error of a rim speed in one step */
+#define HALVINGS 5
 
 /* Solve (I - GAMMA h A) k = k in place, A the arrow matrix of wheel speeds and ground speed. */
 static void solve(const plant_machine *m, const findings *f, double h, double *k) {
@@ -20,9 +24,13 @@ static void solve(const plant_machine *m, const findings *f, double h, double *k
     for (int i = 0; i < n; i++) k[OMEGA + i] = (k[OMEGA + i] + q * f->wv[i] * k[V]) / (1.0 - q * f->ww[i]);
 }
 
-static void advance(const plant_machine *m, const plant_ground *g, const conduct *c, double time, double h, double *y) {
+/* A step in which some rim speed's error (second order against first) is larger than CLOSE of the slip floor is done in halves:
+ * near standstill wheels would jump to and fro over the peak of a curve (docs/decisions/0020). */
+/* A step in which some rim speed's error (second order against first) is larger than CLOSE of the slip floor is done in halves:
+ * near standstill wheels would jump to and fro over the peak of a curve (docs/decisions/0020). */
+static void advance(const plant_machine *m, const plant_ground *g, const conduct *c, double time, double h, int halvings, double *y) {
     const int n = m->wheels, states = TOOL + 6;
-    double k1[PLANT_STATES], k2[PLANT_STATES], mid[PLANT_STATES];
+    double k1[PLANT_STATES], k2[PLANT_STATES], mid[PLANT_STATES], error = 0.0;
     findings f, unused;
     plant_derive(m, g, c, time, y, k1, &f);
     /* The time derivative of the command is left out of A; the second stage sees the command at the step's end. */
@@ -31,6 +39,12 @@ static void advance(const plant_machine *m, const plant_ground *g, const conduct
     plant_derive(m, g, c, time + h, mid, k2, &unused);
     for (int j = 0; j < states; j++) k2[j] -= 2.0 * k1[j];
     solve(m, &f, h, k2);
+    for (int i = 0; i < n; i++) error = fmax(error, m->radius[i] * fabs(0.5 * h * (k1[OMEGA + i] + k2[OMEGA + i])));
+    if (halvings > 0 && !(error <= CLOSE * m->slip_speed)) {
+        advance(m, g, c, time, 0.5 * h, halvings - 1, y);
+        advance(m, g, c, time + 0.5 * h, 0.5 * h, halvings - 1, y);
+        return;
+    }
     for (int j = 0; j < states; j++) y[j] += h * (1.5 * k1[j] + 0.5 * k2[j]);
 }
 
@@ -167,7 +181,7 @@ plant_status plant_continue(const plant_machine *m, const plant_ground *g, plant
         if (memory->steps % stride == 0) record(m, g, &c, time, y, trace + (int64_t)columns * (*rows)++);
         memory->ended = y[X] >= end;
         if (memory->ended) break;
-        advance(m, g, &c, time, step, y);
+        advance(m, g, &c, time, step, HALVINGS, y);
         memory->steps++;
         double sum = 0.0;
         for (int j = 0; j < states; j++) sum += y[j];
