@@ -63,9 +63,10 @@ def test_the_table_holds_the_papers_numbers_ours_and_the_truth(curves: list[Soil
 
 
 def test_soils_beside_each_other_are_drawn_whole(curves: list[SoilCurves]) -> None:
-    """The first soil's height cut those of firmer ground."""
+    """Under its own name each; the first soil's height cut those of firmer ground."""
     hard, fine = curves
-    assert ">0.7</text>" in draw_fits([fine, hard])
+    drawn = draw_fits([fine, hard])
+    assert all(text in drawn for text in (">0.7</text>", ">hard</text>", ">fine</text>"))
 
 
 def test_a_fit_that_is_a_hint_only_does_not_look_the_surest(curves: list[SoilCurves]) -> None:

@@ -93,10 +93,10 @@ def draw_fits(curves: Sequence[SoilCurves], columns: int = 2) -> str:
         named: dict[str, Any] = {}
         for plot, curve in zip(plots.flat, curves, strict=False):
             named |= _draw_fit(plot, curve)
-        for plot in plots.flat[: len(curves)]:  # before all are drawn it would keep the height of the first
-            plot.set_ylim(bottom=0)
             if wide:
                 plot.set_title(curve.name)
+        for plot in plots.flat[: len(curves)]:  # before all are drawn it would keep the height of the first
+            plot.set_ylim(bottom=0)
         for plot in plots.flat[len(curves) :]:
             plot.remove()
         for plot in plots[:, 0]:
