@@ -247,7 +247,9 @@ def test_where_slip_counts_from_is_said_of_wheel_and_drive() -> None:
         "slip counts from the speed that the machine reports, to about 3%."
     )
     assert _notes(wheel, zero, False) == [
-        "Zero-slip radius of wheel rl in this log: 0.7800 ± 0.0020 m, " + REST + "."
+        "Zero-slip radius of wheel rl in this log: 0.7800 ± 0.0020 m, "
+        + REST
+        + ". Slip counts from the file's; 'terragrip calibrate' takes this one."
     ]
     assert _notes(drive, zero, True) == [
         "Zero-slip radius of the drive in this log: 0.7800 ± 0.0020 m, " + REST + ". Slip counts from there."

@@ -90,7 +90,10 @@ def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
     sentence = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
     if zero.doubt:
         return [f"{sentence}; {zero.doubt}."]
-    return [sentence + (". Slip counts from there." if learns else ".")]
+    if learns:
+        return [f"{sentence}. Slip counts from there."]
+    own = rim.wheel != DRIVE and f"{zero.ratio:.3f}" != "1.000"
+    return [f"{sentence}." + " Slip counts from the file's; 'terragrip calibrate' takes this one." * own]
 
 
 def _dead_band(log: Recording, rims: Sequence[Rim]) -> tuple[float, int]:
