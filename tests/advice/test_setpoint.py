@@ -113,6 +113,16 @@ def test_time_that_jumps_or_runs_backward_makes_no_jump_of_speed():
     assert setpoint.update(row(t - 100.0))["fl"] == pytest.approx(after)
 
 
+@pytest.mark.parametrize(("period", "state"), [(0.5, FOLLOW), (1.0, FOLLOW), (2.0, FOLLOW), (3.0, SLOW)])
+def test_estimates_of_a_slow_bus_are_followed_and_a_hole_in_them_is_not(period, state):
+    setpoint, rng = SlipSetpoint(VEHICLE, 0.1, 2.0), np.random.default_rng(0)
+    times = np.arange(40) * period + rng.uniform(-0.1, 0, 40) * (period < 2)
+    rims(setpoint, [row(time) for time in times])
+    assert setpoint.state == state
+    setpoint.update(row(times[-1] + 2.5 * period))
+    assert (setpoint.state, setpoint.why) == (SLOW, "a gap in time")
+
+
 def test_it_takes_what_the_estimator_gives():
     estimator, setpoint = TractionEstimator(VEHICLE), SlipSetpoint(VEHICLE, 0.1, 1.0)
     for k in range(200):

@@ -31,7 +31,7 @@ class Limits:
     speed_up, slow_down: the rim speed's change [m/s²]; crawl: share of the wanted speed that it goes with when it is not led by
     slip (starting, untrusted, warned); hold: seconds that a lapse of trust is bridged by the last speed; widest_slip: SD of slip at the
     wanted speed, and widest_nis: NIS a channel, from which an estimate is not trusted; longest_step: seconds between estimates from
-    which there was a gap.
+    which there was a gap, unless the step before was at least half as long: estimates of a slow bus, up to longest_period [s] apart.
     """
 
     speed_up: float = 0.5
@@ -41,6 +41,7 @@ class Limits:
     widest_slip: float = 0.05
     widest_nis: float = 9.0
     longest_step: float = 0.5
+    longest_period: float = 2.0
 
 
 class SlipSetpoint:
@@ -71,6 +72,7 @@ class SlipSetpoint:
         self._wheels = tuple(self._radius)
         self._rim = 0.0
         self._time: float | None = None
+        self._step = 0.0
         self._trusted_at: float | None = None
         self.state, self.why = SLOW, "starting"
 
@@ -83,8 +85,9 @@ class SlipSetpoint:
         ``slip_<w>_std``, ``nis``, ``channels``, as the estimator gives them). The first row only sets the clock. Never NaN."""
         time = float(estimates["time"])
         step = 0.0 if self._time is None else time - self._time
-        self._time = time
-        late = not 0 <= step <= self.limits.longest_step
+        usual = min(2 * self._step, self.limits.longest_period)
+        self._time, self._step = time, step
+        late = not 0 <= step <= max(self.limits.longest_step, usual)
         self._judge(estimates, time, "a gap in time" if late else "")
         aim = self._aim(estimates, time)
         step = min(max(step, 0.0), self.limits.longest_step)
