@@ -19,12 +19,13 @@ import pytest
 import terragrip as tg
 from small_fleet import VEHICLE, call, fleet, furnished, whole, write_log
 from terragrip.cli import main
+from terragrip.cli.drives import logs_in
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.files import lock
 from terragrip.fleet.cluster import Pool
 from terragrip.fleet.dataset import known_notes, settled, write_tables
-from terragrip.fleet.logs import FleetLog
+from terragrip.fleet.logs import FleetLog, fleet_logs, on_disk
 from terragrip.fleet.run import FleetResult
 from terragrip.fleet.store import Store
 from terragrip.fleet.task import Outcome, _attempt
@@ -220,6 +221,23 @@ def test_estimates_of_the_fleet_are_no_logs_of_it(place: Path, ran: Ran) -> None
         assert f"{estimated} estimated, {6 - estimated} unchanged, 1 failed" in said
     rows, reasons = whole(out)
     assert (len(rows), list(reasons)) == (6, ["note.txt"])
+
+
+def test_the_table_and_its_vehicle_files_beside_the_logs_are_no_logs(place: Path) -> None:
+    index = place / "index.csv"
+    index.write_text("log,vehicle\n" + "".join(f"drive{n}.csv,Thorvald.yaml\n" for n in range(6)))
+    files = on_disk(logs_in([place / "**/*"]), str(place / "out"))
+    logs = fleet_logs(files, place / "Heros.yaml", None, index)
+    assert sorted(log.name for log in logs) == [f"drive{n}.csv" for n in range(6)]
+
+
+def test_a_copy_of_a_log_is_named(place: Path, estimated: Path, ran: Ran) -> None:
+    log = place / "logs/a/drive1.csv"
+    (log.parent / "drive1 (copy).csv").write_bytes(log.read_bytes())
+    assert ran()[0] == 0
+    notes = pd.read_parquet(estimated / "summary.parquet").set_index("log")["notes"]
+    assert "The log is a copy of drive1 (copy).csv: means and curves count both" in notes["drive1.csv"]
+    assert notes.str.contains("is a copy").sum() == 1
 
 
 Refused = Callable[..., str]

@@ -115,6 +115,19 @@ def _files(note: Note) -> set[str]:
     return {note["file"], *note.get("extra", {}).values()}
 
 
+def with_copies(notes: Sequence[Note]) -> list[Note]:
+    """The notes; those of logs with the content of a log before say so, for each counts in means and curves."""
+    first: dict[str, str] = {}
+    result = []
+    for note in notes:
+        content, summary = note.get("content"), note["summary"]  # earlier calls kept no content
+        if content and first.setdefault(content, note["log"]) != note["log"]:
+            text = f"The log is a copy of {first[content]}: means and curves count both; remove one."
+            note = {**note, "summary": {**summary, "notes": f"{summary['notes']} {text}".lstrip()}}
+        result.append(note)
+    return result
+
+
 def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
     """Write summary, soils and failures, each whole or not at all. Raises OSError if the store refuses."""
     import pyarrow as pa

@@ -60,7 +60,7 @@ def matching(pattern: str) -> list[tuple[str, int]]:
         (system.unstrip_protocol(p), int(i.get("size") or 0)) for p, i in found.items() if i["type"] == "file"
     ]
     if not files:
-        raise InputError("no file matches", file=pattern, hint="check the pattern and the folder")
+        raise _no_match(pattern)
     return sorted(files)
 
 
@@ -82,10 +82,12 @@ def on_disk(paths: Iterable[Path], output: str) -> list[tuple[str, int]]:
         inside = [whole] if whole.is_file() else [one for one in whole.rglob("*") if one.is_file()]
         kept.append((str(whole), sum(one.stat().st_size for one in inside)))
     if not kept:
-        raise InputError(
-            "no file matches", file=paths[0] if paths else None, hint="check the pattern and the folder"
-        )
+        raise _no_match(paths[0] if paths else None)
     return kept
+
+
+def _no_match(pattern: Path | str | None) -> InputError:
+    return InputError("no file matches", file=pattern, hint="check the pattern and the folder")
 
 
 def fleet_logs(
@@ -97,18 +99,28 @@ def fleet_logs(
     """The logs with their vehicles and profiles, in the order of ``files``.
 
     ``index``: a CSV with the columns `log` (a path relative to the table, an address, or a file name), `vehicle`, `profile` and `name`.
-    Empty cells default to ``vehicle``, ``profile`` and the file's name.
+    Empty cells default to ``vehicle``, ``profile`` and the file's name. The table itself, the vehicle files and the profiles are
+    no logs, where a pattern matches them too.
 
     Raises
     ------
-    InputError: two logs share a name; a log has no vehicle; a row of the index matches no log; two different vehicles share a name; a
-        vehicle or profile file is invalid.
+    InputError: no log is left; two logs share a name; a log has no vehicle; a row of the index matches no log; two different vehicles
+        share a name; a vehicle or profile file is invalid.
     """
     entries = {} if index is None else _entries(index, [url for url, _ in files])
+    named = (
+        index,
+        vehicle,
+        profile,
+        *(path for one in entries.values() for path in (one.vehicle, one.profile)),
+    )
+    own = {os.path.abspath(path) for path in named if path is not None}
     machines, profiles = _Machines(), _Profiles()
     names: dict[str, str] = {}
     logs = []
     for url, size in files:
+        if url in own:
+            continue
         entry = entries.get(url, _Entry(None, None, ""))
         path = entry.vehicle or vehicle
         if path is None:
@@ -130,6 +142,8 @@ def fleet_logs(
         names[name] = url
         machine, loaded = machines.of(path)
         logs.append(FleetLog(name, url, size, machine, loaded, profiles.of(entry.profile or profile)))
+    if not logs:
+        raise _no_match(files[0][0] if files else None)
     return logs
 
 

@@ -12,7 +12,16 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT
 from terragrip.fleet.cluster import check_address, default_workers, workers_at
 from terragrip.fleet.curves import learn_curves
-from terragrip.fleet.dataset import REPORT, SOILS, Note, known_notes, settled, write_tables, write_text
+from terragrip.fleet.dataset import (
+    REPORT,
+    SOILS,
+    Note,
+    known_notes,
+    settled,
+    with_copies,
+    write_tables,
+    write_text,
+)
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
@@ -101,6 +110,7 @@ def run_fleet(
             except InputError as error:  # the workers are gone; still write the tables of what is done
                 stopped = error
             notes, reasons = settled(store, before, failed, outcomes)
+            notes = with_copies(notes)
             _write(store, notes, reasons)
             if stopped is not None:
                 raise stopped
@@ -116,7 +126,7 @@ def run_fleet(
         failed={one.log: one.reason or "" for one in outcomes if one.note is None},
         unwritten=sum(one.disk_full for one in outcomes),
         kept=sum(note["log"] not in named for note in notes),
-        noted=sum(one.note is not None and bool(one.note["summary"]["notes"]) for one in outcomes),
+        noted=sum(note["log"] in named and bool(note["summary"]["notes"]) for note in notes),
         rows=sum(one["rows"] for one in fresh),
         restarts=sum(one["restart_events"] for one in fresh),
         nis=tuple(one["nis"] for one in fresh if one["nis"] is not None),

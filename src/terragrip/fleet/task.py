@@ -221,6 +221,7 @@ def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extr
     return {
         "log": log.name,
         "key": key,
+        "content": tally.about.get("recording", {}).get("sha256"),
         "file": f"{ESTIMATES}/{place}",
         "extra": {name: f"{name}/{place}" for name in extra.tables},
         "sample": bool(tally.sample),
