@@ -45,6 +45,10 @@ def blank(values: np.ndarray) -> np.ndarray:
     return np.full(len(values), np.nan)
 
 
+def coded(values: np.ndarray) -> np.ndarray:
+    return np.where(np.arange(len(values)) % 50 == 0, -9999.0, values)
+
+
 @pytest.mark.parametrize("how", ["no columns", "empty columns", "one of two"])
 def test_no_positions(tmp_path: Path, how: str, capsys: pytest.CaptureFixture[str]) -> None:
     estimates = drive(*lanes(3, 30, 3))
@@ -68,8 +72,9 @@ def test_no_positions(tmp_path: Path, how: str, capsys: pytest.CaptureFixture[st
         (lambda lat, lon: (-lat, lon), "a sign of latitude or longitude is lost"),
         (lambda lat, lon: (np.radians(lat), np.radians(lon)), "radians"),
         (lambda lat, lon: (lat * 111e3, lon * 70e3), "metres"),
+        (lambda lat, lon: (coded(lat), coded(lon)), "-9999 looks like a code"),
     ],
-    ids=["swapped", "east for west", "south for north", "radians", "metres"],
+    ids=["swapped", "east for west", "south for north", "radians", "metres", "code"],
 )
 def test_positions_that_contradict_speed_or_heading(
     tmp_path: Path, change: Change, fix: str, capsys: pytest.CaptureFixture[str]

@@ -95,6 +95,31 @@ def test_what_a_machine_can_have_is_no_code(name: str, value: float) -> None:
     assert not any("a code for" in note for note in notes_on(spoilt(name, value)))
 
 
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [
+        ("ground_speed", 65.535),
+        ("ground_speed", 65.535 / 3.6),
+        ("drive_torque_fl", 655.35),
+        ("drive_torque_fl", -1.0),
+    ],
+)
+def test_a_code_that_a_machine_could_have_is_named_where_single_samples_leap_to_it(
+    name: str, code: float
+) -> None:
+    """65535 after its scale, and -1: no other channel is accused for them."""
+    (note,) = notes_on(spoilt(name, code))
+    assert note.startswith(f"{name} is {code:.6g} in ")
+    assert "leaps there and back: a code for 'not measured'" in note
+
+
+def test_torques_in_whole_units_may_be_minus_1() -> None:
+    columns = drive()
+    whole = {name: np.round(columns[name]) for name in columns if name.startswith("drive_torque")}
+    assert np.count_nonzero(whole["drive_torque_fl"] == -1.0) > 20
+    assert not any("a code for" in note for note in notes_on(columns | whole))
+
+
 def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
     columns = drive()
     rows = np.arange(0, len(columns["time"]), 100)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.simulation import families
 from terragrip.simulation.campaign import simulate_campaign
 from terragrip.vehicle import Vehicle
 
@@ -278,3 +279,9 @@ def test_the_thrust_that_is_told_beside_a_pull_is_the_whole_one_on_a_climb() -> 
     thrust = sum(np.mean(columns[f"drive_torque_{wheel}"]) for wheel in WHEELS) / RADIUS / MASS / G
     told = notes_on(columns).split("over the wheel radius are ")[1].split()[0]
     assert float(told) == pytest.approx(thrust, abs=0.015)
+
+
+def test_resistances_that_change_with_the_slope_are_no_scale_of_torques() -> None:
+    """A light machine on hills, whose accelerometer agrees with ground speed and pitch: nothing says that a torque is wrong."""
+    drawn = families.draw(families.Kind("light", "saturating", "multirate", "rigid"), 9515, rate=50.0)
+    assert unit_warnings(drawn.recording, drawn.vehicle) == []

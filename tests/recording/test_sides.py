@@ -118,6 +118,10 @@ def test_torques_uneven_on_both_axles_are_the_load() -> None:
     assert notes_on(skidding(), drive_torque_rl=0.75, drive_torque_fl=0.75) == []
 
 
+def test_small_gains_of_two_axles_do_not_add_up_to_a_scale() -> None:
+    assert notes_on(skidding(), drive_torque_rl=0.87, drive_torque_fl=1.1) == []
+
+
 @pytest.mark.parametrize(("scale", "said"), [(1.03, False), (1.1, True)])
 def test_a_rim_that_goes_faster_straight_ahead_is_named(scale: float, said: bool) -> None:
     notes = notes_on(skidding(), wheel_speed_fl=scale)

@@ -93,6 +93,17 @@ def test_torques_count_where_the_vehicle_pulls() -> None:
     assert found == [(0, 2)]
 
 
+@pytest.mark.parametrize(("share", "pairs"), [(0.55, []), (1.0, [(0, 2)])])
+def test_what_a_chassis_shifts_for_half_of_the_drive_is_no_exchange(
+    share: float, pairs: list[tuple[int, int]]
+) -> None:
+    rows = np.arange(40) < 40 * share
+    torques = np.where(rows, np.array([[4.0], [2.0], [2.0], [4.0]]), 3.0)
+    assert (
+        _uneven(np.full((4, 40), 2.0), torques, np.ones(4), [(0, 1), (2, 3)], np.array([1.0, 2.0])) == pairs
+    )
+
+
 def test_of_wheels_of_unlike_radii_the_pulls_are_compared_with_the_loads() -> None:
     """Torques of a steady tractor, in closed form: front left and rear right exchanged, which front right and rear left
     would mend too, were the torques compared."""

@@ -35,19 +35,23 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
     """Raise InputError if positions contradict the motion, with the likely mistake. ``fixes``: rows with a fresh position."""
     latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
     place = "columns latitude, longitude"
-    if np.abs(latitude).max() > 90.0001 or np.abs(longitude).max() > 360.0001:
-        likely = (
-            "swapped"
-            if np.abs(latitude).max() <= 180 and np.abs(longitude).max() <= 90
-            else "metres of a grid"
-        )
+    beyond = (np.abs(latitude) > 90.0001) | (np.abs(longitude) > 360.0001)
+    if beyond.any():
+        codes = np.unique(latitude[beyond])
+        if np.abs(latitude).max() <= 180 and np.abs(longitude).max() <= 90:
+            fix = "they look swapped: correct the profile"
+        elif len(codes) == 1 and not beyond.all():
+            fix = (
+                f"{codes[0]:.6g} looks like a code for 'not measured': leave these cells empty, or write 'invalid: [...]' in the "
+                "profile, in the log's own numbers"
+            )
+        else:
+            fix = "they look like metres of a grid: give degrees"
         raise InputError(
             f"latitudes reach {np.abs(latitude).max():.6g}, beyond 90 degrees",
             file=file,
             place=place,
-            hint=f"they look {likely}: correct the profile"
-            if likely == "swapped"
-            else f"they look like {likely}: give degrees",
+            hint=fix,
         )
     way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))[fixes]
     ends = _stretches(way)

@@ -1,4 +1,5 @@
-"""Values that no machine can have and that come again and again: a logger's code for "not measured"; sentences for the user."""
+"""A logger's code for "not measured": values that no machine can have and that come again and again, or numbers that loggers use so (-1,
+65535 after any decimal scale) to which a channel leaps for single samples; sentences for the user."""
 
 from __future__ import annotations
 
@@ -7,7 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.arrays import Floats
+from terragrip.arrays import Bools, Floats
+from terragrip.recording.held import known_part, quantum
+from terragrip.recording.noise import MAD_TO_SD
+from terragrip.recording.ranks import median
 from terragrip.recording.schema import split_channel
 from terragrip.units import STANDARD_GRAVITY
 
@@ -27,6 +31,15 @@ _WEIGHTS = 5.0  # a force over the weight
 _CODES, _TIMES = 3, 3  # different values, and how often each is there at least
 _BEYOND = 5.0  # times all others
 _MOST = 0.5  # of a channel: where more is impossible, its unit is wrong
+_USED = (
+    9999.0,
+    99999.0,
+    32767.0,
+    65535.0,
+)  # and less one of the two last: J1939's "error", the lowest negative number
+_SHORT, _FEWEST = 3, 5  # rows at such a value, and how often
+_LEAP = 5.0  # standard deviations, and steps, of what single samples differ from their neighbours
+_SLOWEST = 0.15  # s between samples: within more a machine may stop and go
 
 
 def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Recording, list[str]]:
@@ -34,14 +47,24 @@ def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Record
     channels, notes = {}, []
     for name, values in recording.channels.items():
         limit = _limit(name, vehicle)
-        codes = () if limit is None else _codes(values, limit)
+        if limit is None:
+            continue
+        codes = _codes(values, limit)
+        beyond = len(codes) > 0
+        if not beyond:
+            codes = _leapt_to(recording.time, values)
         if not len(codes):
             continue
         bad = np.isin(values, codes)
         channels[name] = np.where(bad, np.nan, values)
         shown = " and ".join(f"{code:.6g}" for code in codes)
+        seen = (
+            f"and at most {np.nanmax(np.abs(channels[name])):.3g} in all others"
+            if beyond
+            else f"(the first at {recording.time[np.argmax(bad)]:.5g} s), and leaps there and back"
+        )
         notes.append(
-            f"{name} is {shown} in {bad.sum()} rows and at most {np.nanmax(np.abs(channels[name])):.3g} in all others: a code for "
+            f"{name} is {shown} in {bad.sum()} rows {seen}: a code for "
             f"'not measured', it seems. Leave these cells empty, or write 'invalid: [...]' in the profile, in the log's own numbers."
         )
     return (replace(recording, channels={**recording.channels, **channels}) if channels else recording), notes
@@ -77,3 +100,41 @@ def _codes(values: Floats, limit: float) -> Floats:
     if len(codes) > _CODES or counts.min() < _TIMES or len(beyond) > _MOST * len(known):
         return none
     return codes if _BEYOND * float(rest.max(initial=0.0)) < float(np.abs(codes).min()) else none
+
+
+def _leapt_to(time: Floats, values: Floats) -> Floats:
+    """Numbers that loggers use as codes, far beyond all others of a channel (n,), or that it leaps to and back from, each second time
+    that it has them or more often."""
+    found = _used_in(values)
+    found = found[[np.count_nonzero(values == code) >= _FEWEST for code in found]] if len(found) else found
+    if not len(found):
+        return found
+    others = np.abs(values[np.isfinite(values) & ~np.isin(values, found)])
+    far = found[np.abs(found) > _BEYOND * others.max(initial=0.0)]
+    if len(far) and len(others) > _MOST * np.isfinite(values).sum():
+        return far
+    when, what = known_part(time, values)
+    first = np.flatnonzero(np.r_[True, np.diff(what) != 0.0])
+    if len(first) < 3 or not 0 < median(np.diff(when)) <= _SLOWEST:
+        return np.empty(0)
+    held, rows = what[first], np.diff(np.r_[first, len(what)])[1:-1]
+    before, after = held[1:-1] - held[:-2], held[1:-1] - held[2:]
+    spread = max(MAD_TO_SD * median(np.abs(before + after) / 2), quantum(what))
+    leaps = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > _LEAP * spread)
+    return np.array([code for code in found if _mostly(leaps & (rows <= _SHORT), held[1:-1] == code)])
+
+
+def _mostly(leaps: Bools, there: Bools) -> bool:
+    """Whether a channel leaps each second time, or more often, that it is at a value, and often enough."""
+    count = np.count_nonzero(leaps & there)
+    return bool(count >= _FEWEST and 2 * count >= np.count_nonzero(there))
+
+
+def _used_in(values: Floats) -> Floats:
+    """Those of a channel's values (n,) that loggers use as codes: -1, or one of `_USED` by any decimal scale, in km/h, too."""
+    numbers = np.array([*_USED, *(-code for code in _USED), 65534.0, -32768.0])
+    scaled = np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], numbers)).ravel()
+    ordered = np.sort(np.r_[-1.0, scaled])
+    place = np.clip(np.searchsorted(ordered, values), 1, len(ordered) - 1)
+    near = np.minimum(np.abs(values - ordered[place]), np.abs(values - ordered[place - 1]))
+    return np.unique(values[near < 1e-9 * np.abs(values)])

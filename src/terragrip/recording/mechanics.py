@@ -40,10 +40,8 @@ _STRETCH = 20  # windows in which the balance leaves less than nothing (on right
 _NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.7  # m/s²: more than twice the usual bias, four degrees of mounting
-_OFFSET_SURE, _OFFSET_LEAST = (
-    4.0,
-    0.2,
-)  # of the bias that the vehicle file states, and m/s²: .02 of the weight
+_OFFSET_SURE = 4.0  # of the bias that the vehicle file states,
+_OFFSET_LEAST = 0.2  # and m/s²: .02 of the weight
 _SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
@@ -246,6 +244,8 @@ def _balance_warnings(
         # A vehicle that digs in slows down the harder it is driven.
         digs = together.slope < 0 and np.nanmean(thrust) > 0
         return [] if digs else [_scale_sentence(together.slope, vehicle)]
+    if moved.alike > _CLEAR and not moved.is_off():  # a resistance that rises on slopes looks so, too
+        return []
     wrong = "against each other" if together.slope < 0 else f"{together.slope:.2g} times apart"
     return [
         f"The drive torques over radius and mass and acceleration_x go {wrong}, and the ground speed does not show which of them is wrong: "

@@ -256,7 +256,7 @@ def _uneven(axles: tuple[Axle, ...], straight: Bools) -> list[str]:
         others = [other for key, (other, _) in shares.items() if key != name]
         if (
             not others
-            or np.abs(share - np.array(others)).min() < _UNEVEN
+            or min(abs(share), np.abs(share - np.array(others)).min()) < _UNEVEN
             or max(map(abs, others)) > _UNEVEN / 2
         ):
             continue

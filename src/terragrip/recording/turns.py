@@ -39,6 +39,7 @@ _SLANT = 0.2  # of the sum of both sides' speeds
 _FEW = 30  # rows
 _UNLIKE = np.log(1.35)  # of an axle's two torques: beyond the gains that `calibrate` accepts
 _ALIKE = np.log(1.15)
+_SURELY = 0.6  # of the windows
 
 
 def filled(time: Floats, values: Floats) -> Floats:
@@ -213,8 +214,11 @@ def _uneven(
         return float(np.max(np.abs(np.log(sides[:, 0] / sides[:, 1])))), float(np.ptp(share))
 
     straight = tuple(range(len(rims)))
-    ratios = np.log([mean[left] / radii[left] * radii[right] / mean[right] for left, right in axles])
-    if np.sum(np.abs(ratios) > _UNLIKE) < 2 or off(straight)[0] < _UNLIKE:
+    sure = [
+        _surely(torques[left, rows] / radii[left], torques[right, rows] / radii[right])
+        for left, right in axles
+    ]
+    if sum(sure) < 2 or off(straight)[0] < _UNLIKE:
         return []
     sides = [k for axle in axles for k in axle]
     same = {frozenset(axle) for axle in axles}
@@ -223,3 +227,9 @@ def _uneven(
         (off(order)[1], pair) for pair, order in _exchanges(len(rims), pairs) if off(order)[0] < _ALIKE
     ]
     return [min(restored)[1]] if restored else []
+
+
+def _surely(left: Floats, right: Floats) -> bool:
+    """Whether an axle's two pulls (n,) are unlike to the same side in most windows: what hills and a chassis shift comes and goes."""
+    most = max(np.mean(left > np.exp(_UNLIKE) * right), np.mean(right > np.exp(_UNLIKE) * left))
+    return bool(most > _SURELY)
