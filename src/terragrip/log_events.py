@@ -6,7 +6,7 @@ import logging
 from typing import Any
 
 LIVE = (
-    "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "unreadable", "schema",
+    "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "late", "unreadable", "schema",
     "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned", "units",
     "contradiction", "immobilization", "stuck", "push",
 )  # fmt: skip

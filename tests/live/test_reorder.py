@@ -8,8 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from machine import rows_of
 from terragrip.live.clock import Pace, SourceClock
+from terragrip.live.core import Core, Settings
 from terragrip.live.counts import Counts
+from terragrip.live.event import Event
 from terragrip.live.reorder import Reorder
 
 STEP = 0.01
@@ -244,3 +247,27 @@ def test_samples_that_were_held_up_and_come_at_once_are_no_fast_clock() -> None:
     pace = Pace()
     late = [pace.wrong(10.0 + 0.001 * k, 0.1 * k) for k in range(100)]
     assert late + [pace.wrong(10.1 + 0.1 * k, 10.0 + 0.1 * k) for k in range(100)] == [None] * 200
+
+
+def late_events(vehicle, short, shift: float, until: float = 6.0) -> list[Event]:
+    """Wheels of one source, ground speed of another whose clock is off by ``shift`` [s] up to an instant."""
+    core = Core(vehicle, Settings(("udp://a", "udp://b")))
+    out = []
+    for time, values in list(rows_of(short.recording))[::10]:
+        speed = {"ground_speed": values.pop("ground_speed")}
+        out += core.process(time, 0, time, values)
+        out += core.process(time + 0.001, 1, time + (shift if time < until else 0.0), speed)
+    return [one for one in out if isinstance(one, Event) and one.kind == "late"]
+
+
+@pytest.mark.parametrize(("shift", "who"), [(-0.4, "udp://b"), (0.4, "udp://a")])
+def test_a_source_whose_clock_is_some_tenths_behind_is_named_once(vehicle, short, shift, who):
+    (event,) = late_events(vehicle, short, shift)
+    assert event.source == who
+    assert "set the sources' clocks" in event.text
+    assert 2.0 <= event.time < 3.0
+
+
+def test_clocks_in_step_and_a_lag_of_a_second_are_no_late_source(vehicle, short):
+    assert late_events(vehicle, short, 0.0) == []
+    assert late_events(vehicle, short, -0.4, until=1.0) == []

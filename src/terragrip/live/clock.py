@@ -18,6 +18,7 @@ JUMP = 10.0  # s
 AGREEMENT = 1.0  # s, and how closely in s leads must agree
 LOSS = 10.0  # s after samples were dropped, in which stamps may lead on by any step
 SYNCHRONISED = 1.0  # s: stamps this close to the machine's clock are on it already
+LATE = 2.0  # s of arrivals, all behind rows already released, after which that is reported
 _WAITING = 5000
 _MARKS, _APART, _TOO_FAST = 4, 0.5, 50.0  # of `Pace`: marks, s between them, s a second
 
@@ -54,6 +55,7 @@ class SourceClock:
     arrival: float = 0.0  # of the newest stamp
     loss_until: float = float("-inf")  # arrival
     waiting: list[Stamped] = field(default_factory=list)
+    late_since: float | None = None  # arrival; inf once reported
 
     def place(
         self, arrival: float, stamp: float, values: Values
@@ -111,6 +113,17 @@ class SourceClock:
     def dropped(self, arrival: float) -> None:
         """Samples were lost on their way up to this arrival."""
         self.loss_until = max(self.loss_until, arrival + LOSS)
+
+    def is_behind(self, arrival: float, late: bool) -> bool:
+        """Whether with this sample, ``late`` or not, all have come too late for LATE seconds; once until one is in time."""
+        if not late:
+            self.late_since = None
+        elif self.late_since is None:
+            self.late_since = arrival
+        elif arrival - self.late_since >= LATE:
+            self.late_since = float("inf")
+            return True
+        return False
 
     def give_up(self) -> list[Stamped]:
         """The samples that wait, now refused: no more will come to agree with them."""

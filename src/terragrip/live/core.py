@@ -194,6 +194,10 @@ class Core:
             unused = self.reorder.add(when, source, time, one)
             if unused:
                 out.append(Refusal(when, time, source, "late or doubled", unused))
+            if self.clocks[source].is_behind(when, len(unused) == len(one) and time < self.time):
+                text = f"all that comes is stamped {self.time - time:.2g} s behind rows already estimated, and refused"
+                text += ": set the sources' clocks, or give a longer --window"
+                out.append(Event(self.time, "late", self.settings.sources[source], text))
         return self._release(self.reorder.ready(arrival), out)
 
     def _refuse_stamps(self, source: int, refused: list[Stamped], out: list[Output]) -> None:
