@@ -127,6 +127,13 @@ def test_wheels_against_the_ground_speed_are_named(odd: tuple[str, ...]) -> None
     )
 
 
+def test_a_ground_speed_of_two_rows_contradicts_no_wheel() -> None:
+    """A receiver was lost after its first values, noise at rest: all wheels were said to need 'sign: -1'."""
+    columns = pulled()
+    columns["ground_speed"] = np.where(np.arange(len(TIME)) < 2, -0.01, np.nan)
+    assert "direction of travel" not in said(columns)
+
+
 def test_a_drive_train_against_the_ground_speed_is_named() -> None:
     columns = pulled()
     table = {

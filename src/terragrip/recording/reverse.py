@@ -26,7 +26,7 @@ _ALIKE = 0.9  # of the rows, or windows, that have one sign
 _MOSTLY = (
     0.75  # of the rows in motion: a ground speed without a sign is that of forward driving in most of them
 )
-_FEWEST = 5  # windows
+_FEWEST = 5  # windows, or measured rows: a line between two says nothing of what is between
 _NOISY = 0.5  # of their size, by which large values of noise change at least
 _TOGETHER = 0.7  # correlation
 
@@ -36,7 +36,8 @@ _WRONG = "in reverse turns the slips of both sides are wrong."
 def against_warnings(recording: Recording) -> list[str]:
     """A sentence on speeds of wheels, or of the drive train, that are against the ground speed while both are large, mostly."""
     channels, time = recording.channels, recording.time
-    known = [n for n in ("ground_speed", *rim_names(channels)) if np.isfinite(channels.get(n, np.nan)).any()]
+    speeds = ("ground_speed", *rim_names(channels))
+    known = [n for n in speeds if np.isfinite(channels.get(n, np.nan)).sum() >= _FEWEST]
     if known[:1] != ["ground_speed"]:
         return []
     ground = filled(time, channels["ground_speed"])
