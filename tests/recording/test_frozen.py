@@ -29,6 +29,18 @@ def test_a_speed_that_is_repeated_for_long_is_named(name: str) -> None:
     assert frozen_warnings(repeated(name, 20.0, 24.0)) == [], "4 s"
 
 
+def test_a_speed_that_is_held_2_s_of_every_10_is_named() -> None:
+    """Too short for the other speeds to change much."""
+    time = np.arange(0.0, 100.0, 0.1)
+    draws = np.random.default_rng(2)
+    speeds = {name: 1 + 0.01 * draws.standard_normal(len(time)) for name in ("ground_speed", "wheel_speed_l")}
+    assert frozen_warnings(Recording.from_frame({"time": time, **speeds})) == []
+    rows = np.arange(len(time))
+    held = speeds["ground_speed"][np.where(rows % 100 >= 80, rows - rows % 100 + 80, rows)]
+    (note,) = frozen_warnings(Recording.from_frame({"time": time, **speeds, "ground_speed": held}))
+    assert note.startswith("ground_speed keeps one value for 1 s or more in 10 places at speed (first ")
+
+
 def test_a_speed_that_is_held_between_its_samples_is_left_alone() -> None:
     """A receiver of 1 Hz in rows of 10 Hz, of one digit: it repeats values by nature."""
     ground = np.round(log().channels["ground_speed"][(np.arange(len(TIME)) // RATE) * RATE], 1)

@@ -193,5 +193,7 @@ def _doubtful(cells: list[str | None], decimal: str) -> int | None:
 def _no_number(cell: str, name: str, row: int, source: str) -> InputError:
     shown = repr(cell) if len(cell) <= 30 else repr(cell[:27] + "...")
     hint = FORMS if name == TIME else "leave the cell empty or give a number"
+    if name == TIME and row == 0 and cell[:1].isalpha():
+        hint = "delete lines of types, units or sources under the names (a profile states units)"
     problem, hint = complaint(cell) or (f"{shown} is not a number", hint)
     return InputError(problem, file=source, place=f"column {name}, row {row + 1}", hint=hint)

@@ -21,6 +21,11 @@ _TIMES = 20.0  # ... and of its usual repetition
 _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: what they change meanwhile
 _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _SEVERAL = 4  # channels
+_OFTEN, _SECOND, _RUN = (
+    5,
+    1.0,
+    10.0,
+)  # runs of one value, each of seconds and of its usual repetition at least
 _MEASURED = 4  # values that are the same
 _FINE, _NOISY = 0.02, 3e-4  # of a speed: smaller steps show its noise, and less is a simulated one's
 _CHANGES = 20  # of a channel's value: fewer show no resolution
@@ -53,7 +58,9 @@ def frozen_warnings(recording: Recording) -> list[str]:
         others = [
             speeds[one] for one in (["ground_speed"] if name != "ground_speed" else rims) if one in speeds
         ]
-        notes += _repeats(name, recording.time, speeds[name], others)
+        notes += _repeats(name, recording.time, speeds[name], others) or _often(
+            name, recording.time, speeds[name]
+        )
     forces = {
         n: v for n, v in recording.channels.items() if n.startswith("drive_torque_") or n == "drawbar_force"
     }
@@ -181,3 +188,21 @@ def _changes(other: Floats, rows: Bools) -> bool:
     """Whether another speed (n,) changes much within ``rows`` (n,)."""
     size = np.abs(other[np.isfinite(other)])
     return bool(len(size)) and _range(usual_values(other[rows])) > _CHANGED * quantile(size, 0.95) > 0.0
+
+
+def _often(name: str, time: Floats, values: Floats) -> list[str]:
+    """On a speed (n,) with noise that again and again keeps one value at speed, however shortly: other speeds hardly change then."""
+    when, what = known_part(time, values)
+    first = np.flatnonzero(np.r_[True, (np.diff(what) != 0.0) | gaps(when)])
+    if len(first) < 3 or is_one_value(what):
+        return []
+    lasting = when[np.r_[first[1:], len(what)] - 1] - when[first]
+    rows = lasting >= max(_SECOND, _RUN * median(np.diff(when[first])))
+    rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
+    if rows.sum() < _OFTEN or not _is_restless(time, values):
+        return []
+    k = int(np.argmax(rows))
+    return [
+        f"{name} keeps one value for {_SECOND:g} s or more in {rows.sum()} places at speed (first {what[first[k]]:.4g} from "
+        f"{when[first[k]]:.4g} s, for {lasting[k]:.2g} s), and never by its noise: not measured, it seems. Leave these cells empty."
+    ]
