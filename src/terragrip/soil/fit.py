@@ -135,8 +135,9 @@ class AdhesionCurve:
         self.interval_: dict[str, tuple[float, float]] = {}
         if self.bootstrap and free:
             self._resample(curve, free, held, best)
-        if len(free) == 1 and free[0] in self.interval_:
-            self.doubt(left_open(free[0], self.parameters_[free[0]], self.interval_[free[0]]))
+        for name in free:
+            if name in self.interval_ and name != INTERCEPT:
+                self.doubt(left_open(name, self.parameters_[name], self.interval_[name]))
         return self
 
     def doubt(self, sentence: str) -> None:

@@ -87,7 +87,7 @@ def at_bound(model: CurveModel, parameters: Mapping[str, float], free: Sequence[
 
 
 def left_open(name: str, value: float, interval: tuple[float, float]) -> str:
-    """The doubt of the one free parameter that its interval leaves open, as where the zero of slip is not known."""
+    """The doubt of a free parameter that its interval leaves open, as where the zero of slip is not known."""
     low, high = interval
     if high - low <= VAGUE * abs(value):
         return ""

@@ -295,7 +295,10 @@ def _learn(
             "slip_std": corrected.slip_std,
         }
         soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
-    usual = float(np.nanmedian(speed))
+    driven = np.isfinite(speed) & (speed > 0)
+    usual = (
+        float(np.average(speed[driven], weights=speed[driven])) if driven.any() else 0.0
+    )  # over the way: standing has none
     gaps = what_to_drive(soil, sorted_by_slip, mass, sample_period, wheels, usual) if mass else []
     return LearnedSoil(soil, curve, by_slip, verdict, corrected, tuple(gaps), tuple(parts))
 
