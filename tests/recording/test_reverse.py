@@ -132,6 +132,7 @@ def test_a_ground_speed_of_two_rows_contradicts_no_wheel() -> None:
     columns = pulled()
     columns["ground_speed"] = np.where(np.arange(len(TIME)) < 2, -0.01, np.nan)
     assert "direction of travel" not in said(columns)
+    assert not reverse_warnings(Recording.from_frame(columns), machine())
 
 
 def test_a_drive_train_against_the_ground_speed_is_named() -> None:

@@ -62,7 +62,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     channels, time = recording.channels, recording.time
     known = [w for w in vehicle.wheels if np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any()]
     ground = channels.get("ground_speed")
-    if ground is None or not known or not np.isfinite(ground).any():
+    if ground is None or not known or np.isfinite(ground).sum() < _FEWEST:
         return []
     rims = {w: filled(time, channels[f"wheel_speed_{w}"]) for w in known}
     rim, speed = np.mean(list(rims.values()), axis=0), filled(time, ground)
