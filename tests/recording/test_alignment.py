@@ -62,7 +62,7 @@ def test_blocks_are_moved_as_the_whole_is(
     monkeypatch: pytest.MonkeyPatch, rows: int, seconds: float, every: int
 ) -> None:
     for module in (alignment, survey):
-        monkeypatch.setattr(module, "ROWS", 1500)
+        monkeypatch.setattr(module, "BEGINNING", 1500)
     time = np.arange(0, 120, 0.05)
     speed = 1.2 + 0.5 * np.sin(time / 5) + 0.2 * np.sin(time * 0.9)
     log = late(
@@ -179,7 +179,7 @@ def test_slip_from_speeds_alone_counts_the_delay() -> None:
 
 
 def test_of_a_long_log_no_more_is_read_ahead_than_shows_its_lag(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alignment, "ROWS", 100)
+    monkeypatch.setattr(alignment, "BEGINNING", 100)
     read = []
 
     def blocks() -> Iterator[Recording]:

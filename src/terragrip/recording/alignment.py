@@ -13,7 +13,7 @@ from terragrip.recording.held import held_period
 from terragrip.recording.lag import Lag, delay_of, is_copy, lag_within, measured
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median
-from terragrip.recording.survey import ROWS, first_speeds
+from terragrip.recording.survey import BEGINNING, first_speeds
 from terragrip.recording.table import Recording
 
 _LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
@@ -23,12 +23,12 @@ def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:
     """Consecutive blocks of a log with its ground speed shifted by the lag of `lag_within`, and a note; an uncertain lag is only noted.
 
     The rows stay. At each instant of a ground speed the result is the value measured then, on a straight line between two
-    samples, or the last one of a held channel. The lag is that of the first `ROWS` rows, whatever the blocks.
+    samples, or the last one of a held channel. The lag is that of the first `BEGINNING` rows, whatever the blocks.
     """
     source, ahead = iter(blocks), list[Recording]()
     for block in source:
         ahead.append(block)
-        if sum(map(len, ahead)) >= ROWS:
+        if sum(map(len, ahead)) >= BEGINNING:
             break
     time, columns = first_speeds(ahead)
     lag = lag_within(time, columns)

@@ -15,8 +15,10 @@ from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.schema import speed_names
 from terragrip.recording.table import Recording
 
-ROWS = 200_000
-"""Rows of a block, where a recording is cut into blocks."""
+ROWS = 50_000
+"""Rows of a block, where a recording is cut into blocks: its estimates take under 32 MB, which malloc uses again for the next."""
+BEGINNING = 200_000
+"""First rows of a log whose speeds show a lag."""
 
 Progress = Callable[[int], None]
 
@@ -85,7 +87,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
             if len(kept) > CHUNKS:
                 every *= 2
                 kept = {k: parts for k, parts in kept.items() if k % every == 0}
-        if rows < ROWS and last.delay is None:
+        if rows < BEGINNING and last.delay is None:
             beginning.append(_speeds_of(last))
         rows = end
         if progress is not None:
@@ -105,13 +107,13 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
 
 
 def first_speeds(blocks: Sequence[Recording]) -> tuple[Floats, dict[str, Floats]]:
-    """Time and speeds of the first `ROWS` rows of consecutive blocks."""
+    """Time and speeds of the first `BEGINNING` rows of consecutive blocks."""
     if not blocks:
         return np.empty(0), {}
     parts = [_speeds_of(block) for block in blocks]
     names = [name for name in parts[0].channels if all(name in part.channels for part in parts)]
-    time = np.concatenate([part.time for part in parts])[:ROWS]
-    return time, {n: np.concatenate([part.channels[n] for part in parts])[:ROWS] for n in names}
+    time = np.concatenate([part.time for part in parts])[:BEGINNING]
+    return time, {n: np.concatenate([part.channels[n] for part in parts])[:BEGINNING] for n in names}
 
 
 def _speeds_of(block: Recording) -> Recording:
