@@ -89,10 +89,13 @@ static void believe_leap(tg_hold *h, tg_real dt)
 void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt)
 {
     tg_real leap[8];
+    int32_t leaps = 0;
     for (int32_t i = 0; i < wheels; i++) {
         const int32_t possible = !rate || h[i].spike < tgi_square(rate[i] * h[i].interval);
         leap[i] = h[i].spike > 0 && h[i].time == time && possible ? h[i].raw - h[i].calm : 0;
+        leaps += leap[i] != 0;
     }
+    if (leaps < 2) return;
     for (int32_t i = 0; i < wheels; i++) {
         int32_t alike = 0;
         for (int32_t j = 0; j < wheels; j++) {
