@@ -140,6 +140,30 @@ def test_light_work_is_told_to_load_more_and_heavy_work_less():
     assert light.interval[0] <= light.gain <= light.interval[1]
 
 
+def test_transport_between_the_work_changes_neither_load_nor_ballast():
+    """Half of the way nothing is pulled: the mean of both was taken for a load, and the double advised, with 2.6 t off a tractor."""
+    work, transport = drive(top=0.2, metres=300), drive(top=0.001, metres=300, seed=1)
+    alone, both = only([work]), only([work, transport])
+    assert both.drive["slip"] == pytest.approx(alone.drive["slip"], abs=0.005)
+    assert both.drive["metres"] == pytest.approx(alone.drive["metres"], rel=0.1)
+    assert [one.what.split(":")[0] for one in both.actions if "oad" in one.what] == ["Keep the load"]
+    assert any("without load" in line for line in both.limits)
+
+
+def test_transport_alone_is_told_no_load():
+    one = only([drive(top=0.05, resistance=0.14, metres=300)])
+    assert one.drive["net_traction"] < 0.03
+    assert one.actions == ()
+    assert "next to nothing was pulled" in one.missing[0]
+
+
+def test_slip_above_the_best_is_never_told_to_load_more():
+    """Pulls that come and go: their mean lies below the best pull, their mean slip above the best slip."""
+    one = only([drive(top=0.25, metres=300)])
+    assert one.drive["slip"] > one.best_efficiency.interval[1]
+    assert not any("Load more" in action.what for action in one.actions)
+
+
 def test_load_advised_is_the_pull_of_the_best_slip():
     one = only([drive(top=0.06)])
     action = next(a for a in one.actions if "Load more" in a.what)

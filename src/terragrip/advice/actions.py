@@ -84,16 +84,17 @@ def _load(work: Work, vehicle: Vehicle) -> list[Action]:
     gain, interval = gained(work.efficiency_at(work.best.slip) - work.efficiency)
     now, best = float(np.mean(work.pull)), work.best.net_traction
     low, high = work.best.interval
-    if low <= float(np.mean(work.slip)) <= high or gain < WORTH or interval[0] < 0:
+    slip, more = float(np.mean(work.slip)), best > now
+    if low <= slip <= high or more != (slip < low) or gain < WORTH or interval[0] < 0:
         return [
             Action(
                 f"Keep the load: no other is certainly better; slip is best at {work.best.slip:.1%} ({low:.1%} to {high:.1%}).",
-                "The mean slip lies within the interval of the best one, or the gain by another load is small or uncertain: "
+                "The mean slip lies within the interval of the best one, the load goes up and down about it, or the gain by another is "
+                "small or uncertain: "
                 f"{100 * gain:.1f} points of efficiency ({100 * interval[0]:.1f} to {100 * interval[1]:.1f}).",
             )
         ]  # fmt: skip
     weight = vehicle.mass * STANDARD_GRAVITY
-    more = best > now
     what = (
         f"{'Load more' if more else 'Load less'}: pull about {_force(best * weight)} instead of {_force(max(now, 0) * weight)} "
         f"on average ({'a deeper or wider tool' if more else 'a shallower or narrower tool'}), until slip is {work.best.slip:.1%} "

@@ -29,12 +29,21 @@ WIDEST_POWER = 0.24
 """A slip of most pull power whose interval is wider is not given."""
 FARTHEST = 2.0
 """A best slip beyond this many times the data's reach rests on what soils are like in general, which is said."""
+MENTIONED = 0.05
+"""Share of the way without load from which it is said."""
 FRONT_POINTS = 21
 NO_PULL = (
     "no drawbar_force was in the log: the best slip is that of a machine which tows nothing. The pull of a tool counts here as soil "
     "resistance, and the best slip with it is another: measure the pull for advice on load, ballast and speed"
 )
 """Of drives whose pull no sensor measured."""
+LEAST_PULL = 0.03
+"""Mean pull over weight under which nothing was towed."""
+NO_LOAD = (
+    "next to nothing was pulled (less than 3 % of the weight): the best slip follows from the ground alone. Drive with the tool at work "
+    "for advice on load, ballast and speed"
+)
+"""Of drives with a drawbar sensor and nothing behind it: transport."""
 CURVE_END, CURVE_POINTS = 0.4, 41
 
 
@@ -91,7 +100,8 @@ def _of_soil(
     name: str, samples: Samples, vehicle: Vehicle, wheels: Sequence[str], soils: Mapping[str, Soil]
 ) -> Advice:
     known = soils.get(name) or (next(iter(soils.values())) if not name and len(soils) == 1 else None)
-    drive = _drive(samples)
+    loaded = samples.under_load()
+    drive = _drive(loaded)
     refuted = known is not None and known.fit.get("follows") is False
     own = of_drives(samples, vehicle) if known is None or refuted else None
     curves = of_library(known, samples, vehicle) if known is not None and own is None else own
@@ -112,7 +122,7 @@ def _of_soil(
     over = curves.over
     best = best_of(over, over.efficiency)
     power = best_of(over, over.productivity)
-    missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(samples, vehicle))
+    missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(loaded, vehicle))
     beyond = own is None and power.slip > curves.reach
     if drive["soil_resistance"] < 0:
         missing.insert(
@@ -120,8 +130,9 @@ def _of_soil(
             f"soil resistance is {drive['soil_resistance']:.3f} in the mean, and no ground pushes: the torques' scale, the drawbar's "
             "zero or a slope is off, and every efficiency here is too high; calibrate, and drive the same way back too",
         )
-    if not samples.towed:
-        missing.insert(0, NO_PULL)
+    works = samples.towed and drive["net_traction"] >= LEAST_PULL
+    if not works:
+        missing.insert(0, NO_LOAD if samples.towed else NO_PULL)
     if beyond:
         missing.append(
             f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
@@ -138,18 +149,19 @@ def _of_soil(
         missing.append(f"{lacking}: the curve is learned from these estimates")
     given = _known(best, over)
     if not given:
-        return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(samples, curves, wheels))
-    slip, pull = samples.levels()
-    fuel = _burnt(samples, vehicle)
+        return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(loaded, curves, wheels))
+    slip, pull = loaded.levels()
+    fuel = _burnt(loaded, vehicle)
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
     advice = Advice(
         name, best,
         power if power.interval[1] - power.interval[0] <= WIDEST_POWER and not beyond else None,
         _front(over, best, power),
         tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
-        _reserve(samples, curves, wheels), {**_field_work(work, vehicle), **fuel}, _limits(work, drive), _curve(over),
+        _reserve(loaded, curves, wheels), {**_field_work(work, vehicle), **fuel},
+        (*_limits(work, drive), *_left_out(samples.way - loaded.way, samples.way)), _curve(over),
     )  # fmt: skip
-    return advice if samples.towed else replace(advice, actions=(), drive=drive, field_work=fuel, limits=())
+    return advice if works else replace(advice, actions=(), drive=drive, field_work=fuel, limits=())
 
 
 def _known(best: Best, over: OverSlip) -> bool:
@@ -247,6 +259,14 @@ def _limits(work: Work, drive: Mapping[str, float]) -> tuple[str, ...]:
     )
     shares = f"of the wheels' power {slipping:.0%} is lost in slip and {rolling:.0%} ({low:.0%} to {high:.0%}) in rolling"
     return (f"{shares}; {larger} is the larger: {cure} helps.",)
+
+
+def _left_out(light: float, way: float) -> tuple[str, ...]:
+    """That ``light`` of ``way`` metres had no load to advise on, where it is worth a word."""
+    if light < MENTIONED * way:
+        return ()
+    words = f"{light:.0f} of {way:.0f} m were driven without load, or nearly so: they tell of the curve, and all figures of the drive "
+    return (words + "are those of the rest",)
 
 
 def _burnt(samples: Samples, vehicle: Vehicle) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from terragrip.vehicle import Vehicle
 
 RADII = 10.0
 """Wheel radii of way that count as one draw: several times the length over which ground varies (2 m of the paper's robot)."""
+HARD, LOADED = 0.9, 0.2
+"""Stretches that pull less than ``LOADED`` of what the quantile ``HARD`` of the way pulls are no work: transport, or a lifted tool."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,20 @@ class Samples:
             for x in (self.slip, self.pull)
         )
         return slip, pull
+
+    def under_load(self) -> Samples:
+        """The rows of the stretches that work (`LOADED`); all of them where nothing pulls.
+
+        Transport tells of the curve, but its load is not to be advised on: its mean with the work's is a load that nobody pulled.
+        """
+        _, index = np.unique(self.stretch, return_inverse=True)
+        way = np.bincount(index, weights=self.metres)
+        pull = np.bincount(index, weights=self.metres * self.pull) / way
+        order = np.argsort(pull, kind="stable")
+        hard = pull[order][np.searchsorted(np.cumsum(way[order]), HARD * way.sum())]
+        rows = pull[index] >= (LOADED * hard if hard > 0 else -np.inf)
+        columns = [one.name for one in fields(self) if one.name not in ("driven", "towed")]
+        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
 
     @property
     def way(self) -> float:
