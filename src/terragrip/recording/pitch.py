@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
-from terragrip.recording.steps import step_of
+from terragrip.recording.level_shift import step_of
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.level_shift import instant_of, step_of
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.sides import Axle, Drive
-from terragrip.recording.steps import instant_of, step_of
 from terragrip.recording.stretches import DRIVING
 from terragrip.recording.track import Track
 from terragrip.recording.turns import WINDOW, filled
