@@ -181,6 +181,14 @@ def test_two_pulls_make_a_curve():
     assert curve.parameters_["a"] == pytest.approx(0.9, rel=0.1)
 
 
+def test_one_pull_is_sorted_by_slip_and_fixes_nothing():
+    one = usable_pairs(table(1, upper=0.3), WHEELS, 2.6, "run")
+    learned = learn_soils([replace(part, pull=np.full_like(part.pull, 0.3)) for part in one]).soils["fine"]
+    assert learned.curve is learned.by_slip
+    assert not learned.curve.identifiability_.identifiable
+    assert any("fewer than two pulls" in note for note in learned.curve.notes_)
+
+
 def test_no_labels():
     columns = table(1)
     columns["soil"] = np.full(len(columns["soil"]), "", dtype=object)

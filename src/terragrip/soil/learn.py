@@ -177,7 +177,7 @@ def learn_soils(
 
     `curve`: an unfitted AdhesionCurve with the settings to use (default: the paper's shape on bins by pull). `bins` by soil; default the
     curve's, on grass the paper's range up to 40 %. Bins by slip replace bins by pull where adhesion falls within the bins (beyond the
-    maximum one pull has two slips); a note says so. `mass` [kg] gives the pulls of
+    maximum one pull has two slips) or only one pull was driven; a note says so. `mass` [kg] gives the pulls of
     the advice. `common_sd`: relative SD of adhesion's error that all runs share; it widens the intervals, and so does
     `common_slip_sd`, the SD of slip's.
     Raises InputError if no pair is labelled.
@@ -307,14 +307,21 @@ def _fits(
     parts: Sequence[RunPairs], template: AdhesionCurve, sorted_by_slip: Bins
 ) -> tuple[AdhesionCurve, AdhesionCurve]:
     """The fit that counts and the paper's by slip, which may be one. Raises InputError with too few slips or pulls, or no fit."""
-    steady = [part.steady for part in parts]
+    steady, one_pull = [part.steady for part in parts], False
     if template.bins.by == BY_PULL and not (
         _falls(sorted_by_slip) and _falls(bin_parts(steady, sorted_by_slip.settings))
     ):
-        curve = explaining(template.unfitted().fit_bins(bin_parts(parts, template.bins)))
-        return curve, _beside(curve, sorted_by_slip)
+        by_pull = bin_parts(parts, template.bins)
+        one_pull = int(np.count_nonzero(by_pull.used)) < 2
+        if not one_pull:
+            curve = explaining(template.unfitted().fit_bins(by_pull))
+            return curve, _beside(curve, sorted_by_slip)
     paper = explaining(template.unfitted(bins=sorted_by_slip.settings).fit_bins(sorted_by_slip))
-    if template.bins.by == BY_PULL:
+    if one_pull:
+        paper.doubt(
+            "Sorted by slip, not by pull: the drives hold fewer than two pulls, so the data do not fix the curve."
+        )
+    elif template.bins.by == BY_PULL:
         paper.notes_.append(
             "Sorted by slip, not by pull: the curve falls within the bins, so that one pull has two slips."
         )
