@@ -66,7 +66,7 @@ class Samples:
         """
         _, index = np.unique(self.stretch, return_inverse=True)
         way = np.bincount(index, weights=self.metres)
-        pull = np.bincount(index, weights=self.metres * self.pull) / way
+        pull = np.bincount(index, weights=self.metres * self.pull) / np.where(way > 0, way, 1.0)
         order = np.argsort(pull, kind="stable")
         hard = pull[order][np.searchsorted(np.cumsum(way[order]), HARD * way.sum())]
         rows = pull[index] >= (LOADED * hard if hard > 0 else -np.inf)

@@ -7,8 +7,6 @@
 #define GAMMA 0.29289321881345254
 #define CLOSE 0.02 /* of the slip floor: error of a rim speed in one step */
 #define HALVINGS 5
-#define CLOSE 0.02 /* of the slip floor: error of a rim speed in one step */
-#define HALVINGS 5
 
 /* Solve (I - GAMMA h A) k = k in place, A the arrow matrix of wheel speeds and ground speed. */
 static void solve(const plant_machine *m, const findings *f, double h, double *k) {
@@ -24,8 +22,6 @@ static void solve(const plant_machine *m, const findings *f, double h, double *k
     for (int i = 0; i < n; i++) k[OMEGA + i] = (k[OMEGA + i] + q * f->wv[i] * k[V]) / (1.0 - q * f->ww[i]);
 }
 
-/* A step in which some rim speed's error (second order against first) is larger than CLOSE of the slip floor is done in halves:
- * near standstill wheels would jump to and fro over the peak of a curve (docs/decisions/0020). */
 /* A step in which some rim speed's error (second order against first) is larger than CLOSE of the slip floor is done in halves:
  * near standstill wheels would jump to and fro over the peak of a curve (docs/decisions/0020). */
 static void advance(const plant_machine *m, const plant_ground *g, const conduct *c, double time, double h, int halvings, double *y) {
