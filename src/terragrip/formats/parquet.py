@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
@@ -25,7 +25,7 @@ _BLOCK = 20_000  # rows that are read or left out together, where a log is looke
 def parquet_on_disk(path: str) -> TableOnDisk:
     """A Parquet file; raises InputError if it is damaged or none, and for columns that hold neither numbers, texts nor dates."""
     with _opened(path) as file:
-        fields = tuple(_leaves(file.schema_arrow))
+        fields = tuple(_flat(file.schema_arrow.empty_table()).schema)
         names = tuple(str(field.name) for field in fields)
         count = int(file.metadata.num_rows)
         unreadable = tuple(field.name for field in fields if not _is_readable(field))
@@ -48,19 +48,8 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     )
 
 
-def _leaves(fields: Iterable[pa.Field]) -> Iterator[pa.Field]:
-    """Fields, those of structs as ``imu.pitch``: what JSON becomes in Parquet."""
-    import pyarrow as pa
-
-    for field in fields:
-        if pa.types.is_struct(field.type):
-            yield from _leaves(field.flatten())
-        else:
-            yield field
-
-
 def _flat(table: pa.Table) -> pa.Table:
-    """A table whose columns are the `_leaves` of its fields."""
+    """A table whose structs, which JSON becomes in Parquet, are columns such as ``imu.pitch``."""
     import pyarrow as pa
 
     while any(pa.types.is_struct(field.type) for field in table.schema):

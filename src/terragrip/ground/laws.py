@@ -7,13 +7,13 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import PERIOD, Blocks
-from terragrip.soil.signature import OFFSET
+from terragrip.soil.signature import OFFSET, USUAL_CURVE
 
 LEVEL_TIME, ROUGHNESS_TIME = 3.5, 1.3
 """Seconds for which neighbouring blocks repeat each other. All soils alike: else the sharper of two laws would win by its name."""
 LEVEL_WAY = 0.75
 """Lengths of vehicle and tool over which levels repeat each other: the same ground is under one wheel after the other."""
-BROAD_RESISTANCE, BROAD_SCALE = (0.12, 0.08), (0.85, 0.5)
+BROAD_RESISTANCE, BROAD_SCALE = (0.12, 0.08), (USUAL_CURVE["a"], 0.5)
 """Mean and SD over all grounds of rho_s (0.02 to 0.3 on fields and roads; ASABE D497) and of the scale of mu's curve."""
 ADHESION_ROUGHNESS = 0.6
 """ln SD within a block of mu, less that of rho_s: what the simulated campaign's soils have in the mean."""

@@ -13,6 +13,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import FLOOR, LARGEST_SLIP, Blocks
+from terragrip.soil.signature import USUAL_CURVE
 
 GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
 """The signals that depend on the ground only. `_sd`: ln of the SD within a block."""
@@ -21,7 +22,7 @@ SIGNALS = (
 )  # fmt: skip
 """All signals on offer. `curve_a`: the kernel's curve while driving, which lags by seconds; `_std`: ln of the estimates' own SD."""
 
-_SCALE, _SCALE_SD, _ADHESION_SD = 0.85, 0.5, 0.03
+_SCALE, _SCALE_SD, _ADHESION_SD = USUAL_CURVE["a"], 0.5, 0.03
 """Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
 _SHOWN = 0.25
 """The scale counts from where slip and mu tell at least this much of it (inverse variance) beside what is known before."""

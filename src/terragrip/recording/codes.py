@@ -31,12 +31,8 @@ _WEIGHTS = 5.0  # a force over the weight
 _CODES, _TIMES = 3, 3  # different values, and how often each is there at least
 _BEYOND = 5.0  # times all others
 _MOST = 0.5  # of a channel: where more is impossible, its unit is wrong
-_USED = (
-    9999.0,
-    99999.0,
-    32767.0,
-    65535.0,
-)  # and less one of the two last: J1939's "error", the lowest negative number
+# 65534: J1939's "error"; -32768: the lowest of two bytes
+_USED = (9999.0, 99999.0, 32767.0, 65535.0, 65534.0, -9999.0, -99999.0, -32767.0, -65535.0, -32768.0)
 _SHORT, _FEWEST = 3, 5  # rows at such a value, and how often
 _LEAP = 5.0  # standard deviations, and steps, of what single samples differ from their neighbours
 _SLOWEST = 0.15  # s between samples: within more a machine may stop and go
@@ -132,8 +128,7 @@ def _mostly(leaps: Bools, there: Bools) -> bool:
 
 def _used_in(values: Floats) -> Floats:
     """Those of a channel's values (n,) that loggers use as codes: -1, or one of `_USED` by any decimal scale, in km/h, too."""
-    numbers = np.array([*_USED, *(-code for code in _USED), 65534.0, -32768.0])
-    scaled = np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], numbers)).ravel()
+    scaled = np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], _USED)).ravel()
     ordered = np.sort(np.r_[-1.0, scaled])
     place = np.clip(np.searchsorted(ordered, values), 1, len(ordered) - 1)
     near = np.minimum(np.abs(values - ordered[place]), np.abs(values - ordered[place - 1]))

@@ -21,11 +21,8 @@ _TIMES = 20.0  # ... and of its usual repetition
 _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: what they change meanwhile
 _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _SEVERAL = 4  # channels
-_OFTEN, _SECOND, _RUN = (
-    5,
-    1.0,
-    10.0,
-)  # runs of one value, each of seconds and of its usual repetition at least
+_OFTEN = 5  # short runs of one value,
+_SECOND, _RUN = 1.0, 10.0  # each of these seconds and times its usual repetition at least
 _MEASURED = 4  # values that are the same
 _FINE, _NOISY = 0.02, 3e-4  # of a speed: smaller steps show its noise, and less is a simulated one's
 _CHANGES = 20  # of a channel's value: fewer show no resolution

@@ -296,9 +296,8 @@ def _learn(
         }
         soil = replace(soil, fit={**soil.fit, "slip_noise": shown})
     driven = np.isfinite(speed) & (speed > 0)
-    usual = (
-        float(np.average(speed[driven], weights=speed[driven])) if driven.any() else 0.0
-    )  # over the way: standing has none
+    # Over the way: standing has none.
+    usual = float(np.average(speed[driven], weights=speed[driven])) if driven.any() else 0.0
     gaps = what_to_drive(soil, sorted_by_slip, mass, sample_period, wheels, usual) if mass else []
     return LearnedSoil(soil, curve, by_slip, verdict, corrected, tuple(gaps), tuple(parts))
 
