@@ -24,13 +24,14 @@ _BLOCK = 20_000  # rows that are read or left out together, where a log is looke
 
 def parquet_on_disk(path: str) -> TableOnDisk:
     """A Parquet file; raises InputError if it is damaged or none, and for columns that hold neither numbers, texts nor dates."""
+    import pyarrow as pa
+
     with _opened(path) as file:
-        fields = tuple(_flat(file.schema_arrow.empty_table()).schema)
+        # Not `Schema.empty_table`: it wakes pandas.
+        fields = tuple(_flat(pa.Table.from_batches([], file.schema_arrow)).schema)
         names = tuple(str(field.name) for field in fields)
         count = int(file.metadata.num_rows)
         unreadable = tuple(field.name for field in fields if not _is_readable(field))
-
-    import pyarrow as pa
 
     def blocks(chosen: list[str], every: int) -> Iterator[Columns]:
         _refuse_twice(names, chosen, path)
