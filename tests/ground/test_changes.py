@@ -224,6 +224,20 @@ def test_a_long_drive_searched_in_pieces_has_the_changes_of_the_whole(monkeypatc
     assert len(whole) == pytest.approx(480 / one_ground - 1, abs=2)
 
 
+def test_a_long_drive_on_one_ground_is_searched_a_few_times_over(monkeypatch):
+    """Pieces without a border grow by their own size: the work goes with the length of the drive."""
+    searched, pelt = [], changes_module._pelt
+    monkeypatch.setattr(changes_module, "_SEARCHED", 20)
+    monkeypatch.setattr(
+        changes_module,
+        "_pelt",
+        lambda c, begin, end, p: searched.append(end - begin) or pelt(c, begin, end, p),
+    )
+    x = np.array([0.12, 0.85, -5.7, -5.1]) + np.random.default_rng(0).standard_normal((600, 4)) * 0.01
+    assert _borders(_Cost(x, Model.of(GROUND)), 8.0) == []
+    assert sum(searched) < 3 * len(x)
+
+
 def test_a_creep_before_a_standstill_is_no_change():
     """As the vehicle rolls out slip is anything, and mu and rho_s with it."""
     stop = Ground(0.2, 0.02, slip=0.02)

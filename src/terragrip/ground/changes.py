@@ -136,7 +136,7 @@ class _Cost:
 
 def _borders(cost: _Cost, price: float) -> list[int]:
     """The steps before which the ground changes. A long drive is searched piece by piece, each from the last border that the piece before
-    found well before its end."""
+    found well before its end; without one the next is much longer, so that one ground all the way costs little more than one search."""
     borders: list[int] = []
     steps, size = len(cost.signal), _SEARCHED
     while True:
@@ -147,7 +147,7 @@ def _borders(cost: _Cost, price: float) -> list[int]:
             return borders + found
         sure = [k for k in found if k <= end - _SEARCHED // 4]
         borders += sure
-        size = _SEARCHED if sure else size + _SEARCHED
+        size = _SEARCHED if sure else 4 * size
 
 
 def _pelt(cost: _Cost, begin: int, end: int, price: float) -> list[int]:
