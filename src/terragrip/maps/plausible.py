@@ -35,9 +35,11 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
     """Raise InputError if positions contradict the motion, with the likely mistake. ``fixes``: rows with a fresh position."""
     latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
     place = "columns latitude, longitude"
-    beyond = (np.abs(latitude) > 90.0001) | (np.abs(longitude) > 360.0001)
-    if beyond.any():
-        codes = np.unique(latitude[beyond])
+    for name, values, most in (("latitude", latitude, 90), ("longitude", longitude, 360)):
+        beyond = np.abs(values) > most + 1e-4
+        if not beyond.any():
+            continue
+        codes = np.unique(values[beyond])
         if np.abs(latitude).max() <= 180 and np.abs(longitude).max() <= 90:
             fix = "they look swapped: correct the profile"
         elif len(codes) == 1 and not beyond.all():
@@ -48,7 +50,7 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
         else:
             fix = "they look like metres of a grid: give degrees"
         raise InputError(
-            f"latitudes reach {np.abs(latitude).max():.6g}, beyond 90 degrees",
+            f"{name}s reach {np.abs(values).max():.6g}, beyond {most} degrees",
             file=file,
             place=place,
             hint=fix,
