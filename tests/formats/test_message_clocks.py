@@ -13,9 +13,9 @@ SENT = 1.7e9 + AFTER
 
 def topic(stamps: np.ndarray, receipts: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """The instants and the notes of a topic of messages with a stamp and a number."""
-    one = Topic("/odom", lambda message: message.items(), lambda message: message["stamp"])
-    for stamp, receipt in zip(stamps.tolist(), receipts.tolist(), strict=True):
-        one.add(receipt, {"stamp": stamp, "speed": 1.0})
+    one = Topic("/odom")
+    for stamp, receipt in zip(stamps, receipts.tolist(), strict=True):
+        one.push(receipt, stamp.tobytes(), lambda sent: (float(np.frombuffer(sent)[0]), {"/odom.speed": 1.0}))
     signals, notes = one.signals()
     return signals["/odom.speed"].time, notes
 

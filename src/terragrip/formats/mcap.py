@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from terragrip.formats.boundary import DAMAGE, LARGEST, as_far_as_it_goes, needed
-from terragrip.formats.messages import Topic, log_of
+from terragrip.formats.messages import Decode, Topic, flat, kept, log_of
 from terragrip.formats.registry import Databases, Format
-from terragrip.formats.ros_types import Types, bag_topic, unpacked
+from terragrip.formats.ros_types import Types
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
 _EPOCH = ("timestamp", "stamp", "time")
-
-Add = Callable[[float, bytes], None]
-"""Takes a message that came at a time [s]; raises what its decoder raises on damage."""
 
 
 def read_mcap(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
@@ -36,7 +33,7 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
     exceptions, kinds = needed("mcap.exceptions", "an MCAP file"), needed("mcap.records", "an MCAP file")
     notes: list[str] = []
     schemas: dict[int, Any] = {}
-    channels: dict[int, tuple[Topic, Add | None]] = {}
+    channels: dict[int, tuple[Topic, Decode | None]] = {}
     unreadable: dict[str, None] = {}
     with (
         as_far_as_it_goes(file, "MCAP file", notes, exceptions.McapError) as seen,
@@ -45,14 +42,16 @@ def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: 
         for record in records(stream, notes):
             if isinstance(record, kinds.Message):
                 seen.messages += 1
-                topic, add = channels[record.channel_id]
-                if add is not None and topic.is_wanted:
-                    _add(topic, add, record.log_time * 1e-9, record.data)
+                topic, decode = channels[record.channel_id]
+                if decode is not None and topic.is_wanted:
+                    topic.push(record.log_time * 1e-9, record.data, decode)
             elif isinstance(record, kinds.Schema):
                 schemas[record.id] = record
             elif isinstance(record, kinds.Channel) and record.id not in channels:
-                channels[record.id] = _channel(record, schemas.get(record.schema_id), wanted, topics, types)
-                if channels[record.id][1] is None:
+                topic = topics.setdefault(record.topic, Topic(record.topic, wanted))
+                decode = _decoder(record, schemas.get(record.schema_id), types)
+                channels[record.id] = topic, decode
+                if decode is None:
                     unreadable[f"{record.topic} ({record.message_encoding})"] = None
     if unreadable:
         notes.append(f"Topics in an unknown encoding were left out: {', '.join(unreadable)}.")
@@ -85,53 +84,42 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Any]:
         notes.append(f"{damaged} chunks are damaged and were left out.")
 
 
-def _add(topic: Topic, add: Add, receipt: float, content: bytes) -> None:
-    """Hand a message to its topic; one that cannot be read is counted."""
-    try:
-        add(receipt, content)
-    except DAMAGE:
-        topic.bad += 1
-    except Exception as error:
-        if type(error).__name__ != "DecodeError":  # protobuf's, whose module needs not be there
-            raise
-        topic.bad += 1
-
-
-def _channel(
-    channel: Any, schema: Any, wanted: Wanted | None, topics: dict[str, Topic], types: Types
-) -> tuple[Topic, Add | None]:
-    """The topic of a channel (of several of one name the same), and what takes its messages; None if its encoding is not known."""
-    encoding = channel.message_encoding
+def _decoder(channel: Any, schema: Any, types: Types) -> Decode | None:
+    """What reads the messages of a channel; None where their encoding is not known."""
+    encoding, topic = channel.message_encoding, channel.topic
     if encoding in ("cdr", "ros1") and schema is not None:
-        ros = bag_topic(channel.topic, wanted, topics)
         language = "idl" if schema.encoding.endswith("idl") else "msg"
         name = types.learn(schema.name, schema.data.decode("utf-8", "replace"), language)
-        form = types.form(name, one=encoding == "ros1")
-        return ros, lambda receipt, content: ros.push(receipt, unpacked(content), form)
+        return types.decoder(name, topic, one=encoding == "ros1")
     if encoding == "protobuf" and schema is not None:
-        topic = topics.setdefault(
-            channel.topic, Topic(channel.topic, _parts_of_protobuf, _stamp_of_protobuf, wanted, getattr)
-        )
         factory = needed("mcap_protobuf.decoder", "protobuf messages").DecoderFactory()
+        damage = needed("google.protobuf.message", "protobuf messages").DecodeError
         try:
-            decode = factory.decoder_for(encoding, schema)
-        except Exception as error:
-            if not isinstance(error, (*DAMAGE,)) and type(error).__name__ != "DecodeError":
-                raise
-            return topic, None
-        return topic, lambda receipt, content: topic.add(receipt, decode(content))
-    topic = topics.setdefault(
-        channel.topic, Topic(channel.topic, _parts_of_json, _stamp_of_json, wanted, dict.__getitem__)
-    )
+            read = factory.decoder_for(encoding, schema)
+        except (*DAMAGE, damage):
+            return None
+
+        def decode(content: bytes) -> tuple[float | None, dict[str, Any]]:
+            try:
+                message = read(content)
+            except damage as error:
+                raise ValueError(str(error)) from error
+            return _stamp_of_protobuf(message), flat(message, _parts_of_protobuf, topic)
+
+        return decode
     if encoding == "json":
-        return topic, lambda receipt, content: topic.add(receipt, json.loads(content))
-    return topic, None
+        return lambda content: _of_json(json.loads(content), topic)
+    return None
+
+
+def _of_json(message: Any, topic: str) -> tuple[float | None, dict[str, Any]]:
+    return _stamp_of_json(message), flat(message, _parts_of_json, topic)
 
 
 def _parts_of_json(message: Any) -> Iterable[tuple[str, Any]]:
     if not isinstance(message, dict) or set(message) in ({"sec", "nsec"}, {"sec", "nanosec"}):
         return ()
-    return message.items()
+    return kept(message.items())
 
 
 def _stamp_of_json(message: Any) -> float | None:
@@ -160,7 +148,7 @@ def _parts_of_protobuf(message: Any) -> Iterable[tuple[str, Any]]:
         if not isinstance(value, bool | int | float | str | bytes) and not hasattr(value, "DESCRIPTOR"):
             value = list(value) if not hasattr(value, "keys") else []
         result.append((part.name, value))
-    return result
+    return kept(result)
 
 
 def _stamp_of_protobuf(message: Any) -> float | None:

@@ -9,11 +9,9 @@ from pathlib import Path
 from terragrip.errors import InputError
 from terragrip.formats.boundary import as_far_as_it_goes
 from terragrip.formats.mcap import collect
-from terragrip.formats.messages import Topic, log_of
+from terragrip.formats.messages import Decode, Topic, log_of
 from terragrip.formats.registry import Databases, Format
-from terragrip.formats.ros_layout import Serialised
-from terragrip.formats.ros_topic import RosTopic
-from terragrip.formats.ros_types import Types, bag_topic, unpacked
+from terragrip.formats.ros_types import Types
 from terragrip.formats.rosbag1 import Connection, records
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
@@ -26,24 +24,24 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     """
     types = Types("ROS1_NOETIC")
     topics: dict[str, Topic] = {}
-    connections: dict[int, tuple[RosTopic, Serialised]] = {}
+    connections: dict[int, tuple[Topic, Decode]] = {}
     notes: list[str] = []
     lost = 0
     with as_far_as_it_goes(path, "ROS 1 bag", notes) as seen, open(path, "rb") as stream:
         for record in records(stream, notes):
             if isinstance(record, Connection):
                 name = types.learn(record.kind, record.definition, "msg")
-                topic = bag_topic(record.topic, wanted, topics)
-                connections.setdefault(record.number, (topic, types.form(name, one=True)))
+                topic = topics.setdefault(record.topic, Topic(record.topic, wanted))
+                connections.setdefault(record.number, (topic, types.decoder(name, topic.name, one=True)))
                 continue
             number, receipt, content = record
             seen.messages += 1
             if number not in connections:
                 lost += 1  # its sender was named in a part that is damaged
                 continue
-            topic, form = connections[number]
+            topic, decode = connections[number]
             if topic.is_wanted:
-                topic.push(receipt, content, form)
+                topic.push(receipt, content, decode)
     if lost:
         notes.append(f"{lost} messages are of undescribed connections were left out.")
     return log_of(topics.values(), path, [*types.notes(), *notes])
@@ -100,8 +98,8 @@ def _collect(
             )
             for place, number, receipt, raw in rows:
                 seen.messages += 1
-                topic, form = known[number]
-                topic.push(receipt * 1e-9, unpacked(raw), form)
+                topic, decode = known[number]
+                topic.push(receipt * 1e-9, raw, decode)
                 if not topic.is_wanted:
                     last = place
                     break
@@ -111,7 +109,7 @@ def _collect(
 
 def _topics_of(
     base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, Topic], types: Types
-) -> dict[int, tuple[RosTopic, Serialised]]:
+) -> dict[int, tuple[Topic, Decode]]:
     """The topics of a SQLite file by number, with how their messages are read."""
     tables = {row[0] for row in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
@@ -121,10 +119,11 @@ def _topics_of(
             "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
         ):
             types.learn(str(name), str(text), str(language).removeprefix("ros2"))
-    known: dict[int, tuple[RosTopic, Serialised]] = {}
+    known: dict[int, tuple[Topic, Decode]] = {}
     for number, name, kind, form in base.execute("SELECT id, name, type, serialization_format FROM topics"):
         if form == "cdr":
-            known[int(number)] = bag_topic(str(name), wanted, topics), types.form(str(kind), one=False)
+            topic = topics.setdefault(str(name), Topic(str(name), wanted))
+            known[int(number)] = topic, types.decoder(str(kind), topic.name, one=False)
         else:
             types.unknown[f"{kind} ({form})"] = None
     return known

@@ -1,18 +1,19 @@
-"""Messages of ROS by the types that a log defines, else by those that come with ROS."""
+"""Messages of ROS, by rosbags: by the types that a log defines, else by those that come with ROS."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from operator import attrgetter
 from typing import Any
 
 from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.messages import Topic
-from terragrip.formats.ros_layout import Serialised
-from terragrip.formats.ros_topic import RosTopic
-from terragrip.formats.table import Wanted
+from terragrip.formats.messages import Decode, flat, kept
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _LARGEST_MESSAGE = 1 << 28  # bytes that one may unpack to
+_CDR = (b"\0\0", b"\0\1")  # how a message of ROS 2 begins: big and little endian
+_NAME = 2  # kind of a field's description in rosbags: a message
+_INSTANT = ({"sec", "nanosec"}, {"sec", "nsec"})  # fields of a time or a duration
 
 
 class Types:
@@ -22,12 +23,13 @@ class Types:
     """
 
     def __init__(self, base: str) -> None:
-        self._typesys = needed("rosbags.typesys", "a ROS message")
+        self._typesys, self._serde = (
+            needed(f"rosbags.{part}", "a ROS message") for part in ("typesys", "serde")
+        )
         self._base = base
         self._own: dict[str, Any] = {}
         self._common: Any = None
         self.unknown: dict[str, None] = {}
-        self._forms: dict[tuple[str, bool], Serialised] = {}
 
     def learn(self, name: str, definition: str, language: str) -> str:
         """Take a type's definition (``msg`` or ``idl``); returns the name that it goes by."""
@@ -47,17 +49,41 @@ class Types:
             self.unknown[name] = None
         return name
 
-    def fields(self, name: str) -> Any:
-        """rosbags' descriptions of a type's fields, and of the types in it; raises KeyError if there are none."""
-        defined = self._own.get(name, self._known()).fielddefs
-        if name not in defined:
-            self.unknown[name] = None
-            raise KeyError(name)
-        return defined
+    def knows(self, name: str) -> bool:
+        """Whether a type is defined; if not, `notes` name it."""
+        if name in self._own.get(name, self._known()).fielddefs:
+            return True
+        self.unknown[name] = None
+        return False
 
-    def form(self, name: str, *, one: bool) -> Serialised:
-        """How messages of a type are read; ``one``: they are serialised by ROS 1."""
-        return self._forms.setdefault((name, one), Serialised(name, one, lambda: self.fields(name)))
+    def decoder(self, name: str, topic: str, *, one: bool) -> Decode:
+        """What reads a topic's messages of a type; ``one``: they are serialised by ROS 1."""
+        store = self._own.get(name, self._known())
+        read = store.deserialize_ros1 if one else store.deserialize_cdr
+        plans: dict[str, tuple[list[str], Callable[[Any], Any]]] = {}
+
+        def parts(message: Any) -> Iterable[tuple[str, Any]]:
+            kind = message.__msgtype__
+            if kind not in plans:
+                places = dict(_places(store, kind))
+                # Of fewer than two attributes it gives no tuple.
+                plans[kind] = list(places), attrgetter(*places.values(), "__msgtype__", "__msgtype__")
+            names, get = plans[kind]
+            return zip(names, get(message), strict=False)
+
+        def decode(content: bytes) -> tuple[float | None, dict[str, Any]]:
+            content = _unpacked(content)
+            if not self.knows(name) or not (one or content.startswith(_CDR)):
+                raise ValueError("not a message of a known type")
+            try:
+                message = read(content, name)
+            except self._serde.SerdeError as error:
+                raise ValueError(str(error)) from error
+            stamp: Any = getattr(getattr(message, "header", None), "stamp", None)
+            sent = stamp.sec + 1e-9 * stamp.nanosec if hasattr(stamp, "nanosec") else None
+            return sent, flat(message, parts, topic)
+
+        return decode
 
     def notes(self) -> list[str]:
         """A sentence on the types that are unknown."""
@@ -73,13 +99,24 @@ class Types:
         return self._common
 
 
+def _places(store: Any, kind: str) -> Iterator[tuple[str, str]]:
+    """The fields of a type by name, those of the messages in it behind a point, and the attributes that hold them."""
+    names = [name for name, _ in store.fielddefs[kind][1]]
+    fields = zip(names, store.get_msgdef(kind).fields, strict=True)
+    for name, (attribute, (node, content)) in kept(fields) if set(names) not in _INSTANT else ():
+        if int(node) == _NAME:
+            yield from ((f"{name}.{own}", f"{attribute}.{place}") for own, place in _places(store, content))
+        else:
+            yield name, attribute
+
+
 def _refers_out(definitions: dict[str, Any]) -> bool:
     """Whether types name others that are not among them (rosbags writes a name as ``(Nodetype.NAME, name)``)."""
     known = {*definitions, "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
 
     def named(node: Any) -> Iterator[str]:
         kind, content = node
-        if int(kind) == 2:
+        if int(kind) == _NAME:
             yield content
         elif int(kind) in (3, 4):
             yield from named(content[0])
@@ -89,14 +126,7 @@ def _refers_out(definitions: dict[str, Any]) -> bool:
     )
 
 
-def bag_topic(name: str, wanted: Wanted | None, topics: dict[str, Topic]) -> RosTopic:
-    """The topic of a bag of this name, of several connections the same one."""
-    result = topics.setdefault(f"ros {name}", RosTopic(name, wanted=wanted))
-    assert isinstance(result, RosTopic)
-    return result
-
-
-def unpacked(raw: bytes) -> bytes:
+def _unpacked(raw: bytes) -> bytes:
     """A message of ROS 2 that may be packed by zstd on its own (rosbag2's compression mode MESSAGE); unpackable ones as they are.
 
     CDR never begins as zstd does, so that no metadata are needed to tell.

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from functools import lru_cache
 
 from terragrip.errors import InputError
-from terragrip.formats.messages import Topic
-from terragrip.formats.ros_types import Types, bag_topic
+from terragrip.formats.boundary import DAMAGE
+from terragrip.formats.messages import Decode
+from terragrip.formats.ros_types import Types
 from terragrip.live.decode import Decoder
 from terragrip.live.payload import Fields, Unreadable
 from terragrip.live.uri import Uri
 
 STRING = "std_msgs/msg/String"
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+_NAMES = 10_000  # of fields, of which it is kept whether they are wanted
 _DDS = re.compile(r"^(\w+)::(\w+)::dds_::(\w+)_$")
 
 
@@ -51,18 +54,18 @@ class Reader:
 
     def __init__(self, decoder: Decoder) -> None:
         self._types = Types("LATEST")
-        self._wanted = decoder.wants if decoder.profile is not None else None
-        self._topics: dict[str, Topic] = {}
+        self._wants = lru_cache(_NAMES)(decoder.wants) if decoder.profile is not None else lambda name: True
+        self._decoders: dict[tuple[str, str], Decode] = {}
 
     def fields(self, topic: str, kind: str, data: bytes) -> Fields:
         """The fields, and ``time`` from the header's stamp; raises Unreadable."""
+        if not self._types.knows(kind):
+            raise Unreadable(f"of the type {kind}, which does not come with ROS 2")
+        if (topic, kind) not in self._decoders:
+            self._decoders[topic, kind] = self._types.decoder(kind, topic, one=False)
         try:
-            self._types.fields(kind)
-        except KeyError:
-            raise Unreadable(f"of the type {kind}, which does not come with ROS 2") from None
-        reader = bag_topic(topic, self._wanted, self._topics)
-        result = reader.fields(data, self._types.form(kind, one=False))
-        if result is None:
-            raise Unreadable(f"not a {kind}")
-        stamp, fields = result
-        return {**fields, "time": stamp} if stamp == stamp and fields else fields
+            stamp, every = self._decoders[topic, kind](data)
+        except DAMAGE:
+            raise Unreadable(f"not a {kind}") from None
+        fields = {name: value for name, value in every.items() if self._wants(name)}
+        return {**fields, "time": stamp} if stamp and fields else fields
