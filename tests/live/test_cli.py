@@ -38,7 +38,7 @@ def wait_for_rows(folder: Path, rows: int) -> None:
     end = time.monotonic() + 120
     while time.monotonic() < end:
         wal = folder / "wal-000001.log"
-        if wal.exists() and wal.stat().st_size > 140 * rows:
+        if wal.exists() and wal.stat().st_size > 350 * rows:
             return
         time.sleep(0.01)
     raise AssertionError("nothing is recorded")

@@ -6,6 +6,7 @@ rosbags' own reader holds the whole index in memory, some 100 bytes a message, a
 from __future__ import annotations
 
 import bz2
+import io
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -66,8 +67,8 @@ def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | Non
     (length,) = _LENGTH.unpack(head)
     if length > _LONGEST_HEADER:
         raise ValueError("a record's header has over 64 KiB")
-    fields = _fields(exactly(stream, length))
-    (size,) = _LENGTH.unpack(exactly(stream, _LENGTH.size))
+    fields = _fields(_exactly(stream, length))
+    (size,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
     if size > LARGEST:
         raise ValueError("a record of over 1 GiB")
     content = stream.read(size)
@@ -126,19 +127,13 @@ def _unpacked(fields: dict[bytes, bytes], content: bytes) -> bytes:
 
 def _inner(content: bytes) -> Iterator[Connection | Message]:
     """The records in a chunk; raises as `records` does."""
-    place, end = 0, len(content)
-    while place < end:
-        (length,) = _LENGTH.unpack_from(content, place)
-        place += _LENGTH.size
-        fields = _fields(content[place : place + length])
-        (size,) = _LENGTH.unpack_from(content, place + length)
-        place += length + _LENGTH.size
-        if place + size > end:
+    stream = io.BytesIO(content)
+    while (record := _next(stream)) is not None:
+        kind, fields, inside, whole = record
+        if not whole:
             raise ValueError("a record reaches beyond its chunk")
-        kind = fields[b"op"][0]
         if kind in (_MESSAGE, _CONNECTION):
-            yield _record(kind, fields, content[place : place + size])
-        place += size
+            yield _record(kind, fields, inside)
 
 
 def _record(kind: int, fields: dict[bytes, bytes], content: bytes) -> Connection | Message:
@@ -156,7 +151,7 @@ def _connection(fields: dict[bytes, bytes], content: bytes) -> Connection:
     return Connection(number, *(text.decode("utf-8", "replace") for text in texts))
 
 
-def exactly(stream: BinaryIO, size: int) -> bytes:
+def _exactly(stream: BinaryIO, size: int) -> bytes:
     """The next ``size`` bytes; raises ValueError where there are fewer."""
     result = stream.read(size)
     if len(result) < size:

@@ -102,7 +102,7 @@ class Recorder:
                 self.segment, torn = segment, reading.size - reading.good
                 if reading.good:
                     path = wal_path(self.folder, segment.number)
-                    ahead = WriteAhead(path, append_at=reading.good, names=reading.names)
+                    ahead = WriteAhead(path, append_at=reading.good)
         self._ahead = self._open_wal() if ahead is None else ahead
         if self.core.rows:
             text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
