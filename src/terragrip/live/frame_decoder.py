@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 
-from terragrip.formats.can.bits import Field
+import numpy as np
+
+from terragrip.formats.can.bits import decode
 from terragrip.formats.can.catalog import EXTENDED, Message, catalog, group_of, source_of
 from terragrip.formats.can.frames import of_sender
 from terragrip.formats.can.transport import CONNECTION, DATA, Transport, is_fast
 from terragrip.live.payload import Fields
 
-_FLOATS = {16: "<e", 32: "<f", 64: "<d"}
-
 
 class FrameDecoder:
     """Fields of a frame as a log of it would name them; ``units`` by name; ``unknown`` counts frames that no table holds.
 
-    ``wants`` tells whether a signal of one of several senders (``Name@F0``) is asked for. Raises InputError on a DBC that
+    ``wants`` tells whether a signal is asked for, also that of one of several senders (``Name@F0``). Raises InputError on a DBC that
     cannot be read.
     """
 
     def __init__(self, databases: Sequence[str], wants: Callable[[str], bool]) -> None:
         self._catalog = catalog(databases)
         self._wants = wants
-        self._plans: dict[int, list[tuple[Field, tuple[str, ...]]] | None] = {}
+        self._plans: dict[int, tuple[Message, dict[str, list[str]]] | None] = {}
         self._transport = Transport()
         self.unknown: dict[int, int] = {}
         self.units = {
@@ -35,7 +34,7 @@ class FrameDecoder:
         }
 
     def fields(self, identifier: int, extended: bool, data: bytes) -> Fields:
-        """The fields of a data frame, or of the message that it completes; empty where no table holds it.
+        """The wanted fields of a data frame, or of the message that it completes; empty where no table holds it.
 
         "Not available" and "error" are left out.
         """
@@ -51,58 +50,31 @@ class FrameDecoder:
         return self._fields(key, data)
 
     def _fields(self, key: int, data: bytes) -> Fields:
-        """The fields of a whole payload."""
+        """The wanted fields of a whole payload."""
         if key not in self._plans:
             self._plans[key] = self._plan(key)
         plan = self._plans[key]
         if plan is None:
             self.unknown[key] = self.unknown.get(key, 0) + 1
             return {}
-        raws = {field.name: _raw(field, data) for field, _ in plan}
-        result: Fields = {}
-        for field, names in plan:
-            raw = raws[field.name]
-            if raw is None or raw in field.missing:
-                continue
-            if field.selector is not None and raws.get(field.selector) not in field.chosen:
-                continue
-            value = _physical(field, raw)
-            if field.reverse is not None and raws.get(field.reverse) == 0:
-                value = -value
-            for name in names:
-                result[name] = value
-        return result
+        message, names = plan
+        if not names or not data:
+            return {}
+        payload, length = np.frombuffer(data, np.uint8)[None], np.array([len(data)], np.uint16)
+        values = {
+            field: float(value[0])
+            for field, value in decode(message.fields, set(names), payload, length).items()
+        }
+        return {name: value for field, value in values.items() if value == value for name in names[field]}
 
-    def _plan(self, key: int) -> list[tuple[Field, tuple[str, ...]]] | None:
-        """The message's fields and the names of each."""
+    def _plan(self, key: int) -> tuple[Message, dict[str, list[str]]] | None:
+        """The message, and by its fields the names that are wanted."""
         message = self._catalog.message_of(key)
         if message is None:
             return None
-        return [(field, self._names(message, field, key)) for field in message.fields]
-
-    def _names(self, message: Message, field: Field, key: int) -> tuple[str, ...]:
-        name = self._catalog.name(message, field)
-        sender = of_sender(name, source_of(key)) if message.by_group else name
-        return (name, sender) if sender != name and self._wants(sender) else (name,)
-
-
-def _raw(field: Field, data: bytes) -> int | None:
-    """The raw value, unsigned; None where the payload does not reach to it."""
-    if len(data) <= field.last_byte:
-        return None
-    if field.little_endian:
-        raw = int.from_bytes(data, "little") >> field.start
-    else:
-        position = 8 * (field.start // 8) + 7 - field.start % 8  # from the first byte's highest bit
-        raw = int.from_bytes(data, "big") >> (8 * len(data) - position - field.length)
-    return raw & ((1 << field.length) - 1)
-
-
-def _physical(field: Field, raw: int) -> float:
-    if field.floating:
-        number = struct.unpack(_FLOATS[field.length], raw.to_bytes(field.length // 8, "little"))[0]
-    elif field.signed and raw >> (field.length - 1):
-        number = raw - (1 << field.length)
-    else:
-        number = raw
-    return float(field.scale * number + field.offset)
+        names = {}
+        for field in message.fields:
+            own = self._catalog.name(message, field)
+            every = (own, of_sender(own, source_of(key))) if message.by_group else (own,)
+            names[field.name] = [name for name in every if self._wants(name)]
+        return message, {field: wanted for field, wanted in names.items() if wanted}

@@ -30,7 +30,8 @@ class CanSource:
         check(uri)
         own = decoder.profile.dbc if decoder.profile is not None else ()
         databases = [name for name in uri.options.get("dbc", "").split(",") if name]
-        self.frames = FrameDecoder([*databases, *own], decoder.wants)
+        wants = decoder.wants if decoder.profile is not None else lambda name: True
+        self.frames = FrameDecoder([*databases, *own], wants)
         decoder.units = self.frames.units
 
     async def run(self, feed: Feed) -> None:
