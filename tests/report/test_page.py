@@ -125,6 +125,14 @@ def test_an_absent_input_leaves_a_sentence_not_an_error(drive: Drive, missing: s
         assert "cover the truth" not in html  # what is shown is the noise alone
 
 
+def test_a_quantity_that_is_never_known_is_an_empty_lane(drive: Drive) -> None:
+    """As soil resistance while a PTO takes an unknown part all along; a warning of NumPy's would fail this test."""
+    run = drive()
+    unknown = dict.fromkeys(("soil_resistance", "soil_resistance_std"), np.nan)
+    bare = Run(run.name, run.estimates.assign(**unknown), run.method)
+    assert not sections.slip_and_resistance(bare).omitted
+
+
 def test_with_nothing_to_compare_the_sections_say_so(drive: Drive) -> None:
     run = drive()
     estimates = run.estimates.assign(nis=np.nan)

@@ -241,7 +241,9 @@ def _lane(
     """
     estimate, std, truth = run.estimated(column), run.estimated(f"{column}_std"), run.true(column)
     rows = run.moving & ~run.stuck if never_stuck else run.moving
-    rows = rows & ~(std > HARDLY * np.nanmedian(np.append(std[rows], np.nan)))
+    usual = std[rows & np.isfinite(std)]
+    if len(usual):
+        rows = rows & ~(std > HARDLY * np.median(usual))
     sources = [estimate - 1.96 * std, estimate + 1.96 * std, truth, measured]
     known = [v[rows & np.isfinite(v)] for v in sources if v is not None]
     ends = [np.percentile(v, [0.3, 99.7]) for v in known if len(v)]
