@@ -196,6 +196,9 @@ def test_a_dragged_handle_gives_a_curve_and_its_parameters(client: TestClient) -
     held = client.post("/api/curve/move", json={**sent, **goal, "held": ["c1", "c2", "c3"]})
     assert held.status_code == 422
     assert client.post("/api/curve/move", json={**sent, **goal, "handle": "tail"}).status_code == 422
+    unknown = client.post("/api/curve/move", json={**sent, **goal, "parameters": {"zz": 1.0}})
+    assert unknown.status_code == 422
+    assert "no parameter 'zz'" in unknown.text
 
 
 def test_a_fit_from_here_begins_where_the_curve_was_dragged(client: TestClient) -> None:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field, FiniteFloat
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel
 from terragrip.soil.handles import Handle, handles, moved
+from terragrip.soil.least_squares import INTERCEPT
 from terragrip.studio.api.files import finite
 
 router = APIRouter(tags=["fit"])
@@ -75,15 +76,17 @@ def _known(wanted: CurveRequest) -> tuple[CurveModel, dict[str, float]]:
             f"there is no curve model {wanted.model!r}", hint=f"choose one of {', '.join(CURVES)}"
         )
     model = CURVES[wanted.model]
+    if unknown := sorted(set(wanted.parameters) - {*model.names, INTERCEPT}):
+        raise InputError(
+            f"curve model {model.name} has no parameter {unknown[0]!r}",
+            hint=f"it has {', '.join(model.names)}",
+        )
     return model, {p.name: p.start for p in model.parameters} | wanted.parameters
 
 
 def _shown(model: CurveModel, parameters: dict[str, float], held: list[str]) -> dict[str, Any]:
-    own = {name: value for name, value in parameters.items() if name != "intercept"}
-    try:
-        values = model.value(SLIPS, own, parameters.get("intercept", 0.0))
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    own = {name: value for name, value in parameters.items() if name != INTERCEPT}
+    values = model.value(SLIPS, own, parameters.get(INTERCEPT, 0.0))
     plain: dict[str, Any] = finite(
         {
             "slip": SLIPS.tolist(),
