@@ -164,6 +164,8 @@ def test_what_a_pto_takes_does_not_pull(tractor: tg.Vehicle) -> None:
     assert np.isfinite(unknown["slip_driven"]).all()
     assert "gap" not in unknown["event"]
     assert any("The PTO turns in 50% of the log" in note for note in unknown.notes)
+    mowing = baling.with_channels(pto_speed=0 * log.time, pto_speed_front=baling["pto_speed"])
+    np.testing.assert_array_equal(tg.estimate(mowing, tractor)["adhesion_driven"], unknown["adhesion_driven"])
     data = tractor.to_dict()
     data["driveline"] |= {"pto_power": "60 kW", "pto_power_std": "10 kW"}
     known = tg.estimate(baling, tg.Vehicle.from_dict(data))

@@ -144,10 +144,11 @@ def driveline_torque(
 
 
 def pto_turns(time: Floats, channels: Mapping[str, Floats]) -> Bools:
-    """Rows (n,) in which a power take-off turns; none where no channel says so."""
-    if "pto_speed" not in channels:
-        return np.zeros(len(time), dtype=bool)
-    turns: Bools = np.abs(held(time, channels["pto_speed"])) > _TURNING
+    """Rows (n,) in which a power take-off turns, rear or front; none where no channel says so."""
+    turns = np.zeros(len(time), dtype=bool)
+    for name in ("pto_speed", "pto_speed_front"):
+        if name in channels:
+            turns |= np.abs(held(time, channels[name])) > _TURNING
     return turns
 
 

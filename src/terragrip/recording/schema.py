@@ -15,7 +15,8 @@ CHANNELS = {
     "engine_torque_share": "1",  # of the reference torque, friction included: J1939's actual engine percent torque
     "engine_friction_share": "1",  # of the reference torque: J1939's nominal friction percent torque
     "engine_reference_torque": "N m",
-    "pto_speed": "rad/s",  # of a power take-off, which takes engine power while it turns
+    "pto_speed": "rad/s",  # of a power take-off, which takes engine power while it turns; the rear one of two
+    "pto_speed_front": "rad/s",
     "fuel_rate": "m^3/s",
     "drawbar_force": "N",
     "hitch_load": "N",  # vertical force of an implement on the hitch, down positive
