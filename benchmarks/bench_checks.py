@@ -4,7 +4,7 @@
 
 The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, rest.py,
 torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, torques.py's least
-thrust, steps.py's, rescaled.py's and leaps.py's, and the stretch of mechanics.py. Right logs are development drives of three chassis
+thrust, level_shift.py's, rescaled.py's and leaps.py's, and the stretch of mechanics.py. Right logs are development drives of three chassis
 (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log
 of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that have negative ones); one
 is found where its own note comes.
@@ -52,7 +52,7 @@ LIMITS = {
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
     "pitch": "_LONG _MOVED _BEYOND",
-    "steps": "_STAYS",
+    "level_shift": "_STAYS",
     "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
     "leaps": "_LEAST _BEYOND _SURE _HALF _REST",
     "mechanics": "_STRETCH",
