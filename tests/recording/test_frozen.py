@@ -47,6 +47,13 @@ def test_a_speed_that_is_held_between_its_samples_is_left_alone() -> None:
     assert frozen_warnings(log(ground_speed=ground)) == []
 
 
+def test_a_cruise_in_tenths_of_kmh_is_left_alone() -> None:
+    """At 10 km/h the noise of a centimetre a second seldom shows in the display's steps of 3 cm/s."""
+    noise = 0.01 * np.random.default_rng(4).standard_normal(len(TIME))
+    ground = np.round((2.78 + 0.3 * np.sin(TIME / 20) * (TIME // 30 % 2) + noise) * 36) / 36
+    assert frozen_warnings(log(ground_speed=ground)) == []
+
+
 def test_a_ground_speed_of_0_may_be_a_vehicle_that_is_stuck() -> None:
     assert frozen_warnings(repeated("ground_speed", 20.0, 40.0, 0.0)) == []
 

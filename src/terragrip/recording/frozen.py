@@ -23,6 +23,7 @@ _COARSE = 0.1  # of the size of a channel: larger steps hide the changes
 _SEVERAL = 4  # channels
 _OFTEN = 5  # short runs of one value,
 _SECOND, _RUN = 1.0, 10.0  # each of these seconds and times its usual repetition at least
+_RESOLVED = 0.5  # of the noise: larger steps hide it, and a sound speed keeps its value in a cruise
 _MEASURED = 4  # values that are the same
 _FINE, _NOISY = 0.02, 3e-4  # of a speed: smaller steps show its noise, and less is a simulated one's
 _CHANGES = 20  # of a channel's value: fewer show no resolution
@@ -188,7 +189,8 @@ def _changes(other: Floats, rows: Bools) -> bool:
 
 
 def _often(name: str, time: Floats, values: Floats) -> list[str]:
-    """On a speed (n,) with noise that again and again keeps one value at speed, however shortly: other speeds hardly change then."""
+    """On a speed (n,) that again and again keeps one value at speed, however shortly, though its noise moves each sample by more than its
+    resolution: other speeds hardly change then."""
     when, what = known_part(time, values)
     first = np.flatnonzero(np.r_[True, (np.diff(what) != 0.0) | gaps(when)])
     if len(first) < 3 or is_one_value(what):
@@ -196,7 +198,8 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     lasting = when[np.r_[first[1:], len(what)] - 1] - when[first]
     rows = lasting >= max(_SECOND, _RUN * median(np.diff(when[first])))
     rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
-    if rows.sum() < _OFTEN or not _is_restless(time, values):
+    is_resolved = quantum(what) < _RESOLVED * (white_noise(when, what) or 0.0)
+    if rows.sum() < _OFTEN or not is_resolved or not _is_restless(time, values):
         return []
     k = int(np.argmax(rows))
     return [
