@@ -60,6 +60,19 @@ def test_reverse(quiet, drive):
     assert not truth.push  # against travel, not against the machine's back
 
 
+def test_a_vehicle_that_slides_back_is_driven_forward_by_wheels_that_spin_forward(quiet, drive):
+    """Too steep for its ground: µ and slip keep the sign that they have on its curve."""
+    from terragrip.simulation.truth import truth_frame
+
+    steep = {"segments": [{"soil": "even", "length": 60}], "slope": {"mean": 0.12}}
+    slippery = {"even": {"curve": {"name": "exponential", "a": 0.2}, "resistance": 0.01}}
+    trace = drive(quiet(soils=slippery, tools=[], route=steep, driver={"acts": False}, duration=3))
+    truth = truth_frame(trace, trace).iloc[-1]
+    assert truth.true_ground_speed < -0.3
+    assert truth.true_slip_rr > 0.1
+    assert truth.true_adhesion_rr > 0.09
+
+
 HOLE = {"at": 3.0, "length": 0.3, "rear": 2.2, "adhesion_loss": 0.2}
 
 

@@ -195,15 +195,15 @@ def delay_of(lag: Lag | None) -> float:
 
 def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
     """Whether a wheel's speed was computed from the ground speed, as for a free wheel without a sensor: it has the ground speed's lag."""
-    known = np.isfinite(turning)
-    if not np.isfinite(ground[known]).all() or not np.any(ground[known]):
-        return False
-    turning, ground = turning[known], ground[known]
-    scale = float(np.sum(turning * ground) / np.sum(ground**2))
-    few = slice(_FEW)  # of most wheels they show it already
-    return all(
-        np.allclose(turning[rows], scale * ground[rows], rtol=1e-6, atol=1e-9) for rows in (few, slice(None))
-    )
+    for step in (len(turning) // _FEW + 1, 1):  # of most wheels a few samples show it already
+        wheel, speed = turning[::step], ground[::step]
+        known = np.isfinite(wheel)
+        wheel, speed = wheel[known], speed[known]
+        moves = bool(np.any(speed))
+        scale = float(np.sum(wheel * speed) / np.sum(speed**2)) if moves else 0.0
+        if not (np.isfinite(speed).all() and np.allclose(wheel, scale * speed, rtol=1e-6, atol=1e-9)):
+            return False
+    return moves
 
 
 def offset_between(

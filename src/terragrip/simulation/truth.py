@@ -122,6 +122,6 @@ def _fastest(trace: Trace) -> Floats:
 
 
 def _direction(trace: Trace) -> Floats:
-    """+1 forward, -1 in reverse (n,): by ground speed, by the wheels where it hardly moves."""
-    speed, rim = trace["speed"], (trace["wheel_speed"] * trace.radius).mean(axis=1)
-    return np.where(np.where(np.abs(speed) > STANDSTILL_SPEED, speed, rim) < -1e-3, -1.0, 1.0)
+    """+1 forward, -1 in reverse (n,), by ground and rims: wheels that spin forward while the vehicle slides back drive forward."""
+    rim = (trace["wheel_speed"] * trace.radius).mean(axis=1)
+    return np.where(trace["speed"] + rim < -1e-3, -1.0, 1.0)
