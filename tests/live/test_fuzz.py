@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -98,16 +97,3 @@ def test_any_damage_to_a_write_ahead_file(tmp_path_factory, data):
     result = list(reading)
     assert result == whole[: len(result)]
     assert reading.good <= max(cut, len(MAGIC))
-
-
-def test_a_write_ahead_file_calls_nothing(tmp_path):
-    class Call:
-        def __reduce__(self):
-            return os.mkdir, (str(tmp_path / "made"),)
-
-    wal = WriteAhead(tmp_path / "wal.log")
-    wal.add("T", 1.0)
-    wal.add("N", Call())
-    wal.close()
-    assert list(Reading(tmp_path / "wal.log")) == [("T", 1.0)]
-    assert not (tmp_path / "made").exists()
