@@ -120,6 +120,12 @@ def test_torques_in_whole_units_may_be_minus_1() -> None:
     assert not any("a code for" in note for note in notes_on(columns | whole))
 
 
+def test_a_free_cell_in_whole_units_may_be_0_or_minus_1() -> None:
+    columns = spoilt("drawbar_force", -1.0)
+    columns["drawbar_force"] = np.where(columns["drawbar_force"] == -1.0, -1.0, 0.0)
+    assert not any("a code for" in note for note in notes_on(columns))
+
+
 def test_spikes_that_differ_are_no_code_and_a_wrong_unit_is_none() -> None:
     columns = drive()
     rows = np.arange(0, len(columns["time"]), 100)

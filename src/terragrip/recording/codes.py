@@ -107,7 +107,7 @@ def _leapt_to(time: Floats, values: Floats) -> Floats:
         return found
     others = np.abs(values[np.isfinite(values) & ~np.isin(values, found)])
     far = found[np.abs(found) > _BEYOND * others.max(initial=0.0)]
-    if len(far) and len(others) > _MOST * np.isfinite(values).sum():
+    if len(far) and others.any() and len(others) > _MOST * np.isfinite(values).sum():
         return far
     when, what = known_part(time, values)
     first = np.flatnonzero(np.r_[True, np.diff(what) != 0.0])
