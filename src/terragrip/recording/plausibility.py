@@ -15,6 +15,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
+from terragrip.recording.cut import cut_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.free_axles import free_axle_warnings
@@ -202,6 +203,7 @@ _EACH = (
     Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
     Check("frozen", lambda log: frozen_warnings(log.whole), _TIME, needs_wheels=False),
     Check("dropouts", lambda log: dropout_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
     Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
     Check("codes", lambda log: log.codes, needs_wheels=False),
