@@ -1,4 +1,4 @@
-"""Numbers written with a sign between thousands: ``1,234`` must not become 1.234."""
+"""Numbers written with a sign between thousands, where ``1,234`` must not become 1.234, or with their unit (``3.2 km/h``)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,12 @@ from collections.abc import Sequence
 SIGNS = ",.' \u2019\u00a0\u202f"
 """What stands between thousands, somewhere."""
 _GROUPED = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?P<sign>[{SIGNS}])\d{{3}}(?:(?P=sign)\d{{3}})*(?:[.,]\d+)?")
+
+_WITH_UNIT = re.compile(
+    r"[+-]?\d+(?:[.,]\d+)?\s*(?P<unit>[kcm]?m/s(?:²|\^?2)?|km/h|kph|mph|kn|rpm|[1U]/min|rad(?:/s)?|deg(?:/s)?|°(?:/s)?|%|da?N|[kM]N|"
+    r"(?:k|da)?N[ ·]?m|kgf?|lbf?|bar|kW)",
+    re.IGNORECASE,
+)
 
 
 def is_grouped(cell: str, sign: str) -> bool:
@@ -27,7 +33,12 @@ def has_thousands(cells: Sequence[str], sign: str) -> bool:
 
 
 def complaint(cell: str) -> tuple[str, str] | None:
-    """What is wrong with a cell that may have a sign between thousands, and what to write; None where it has none."""
+    """What is wrong with a cell that has its unit, or may have a sign between thousands, and what to write; None where it has neither."""
+    if found := _WITH_UNIT.fullmatch(cell):
+        return (
+            f"{cell!r} has its unit in the cell",
+            f"write numbers alone, and [{found['unit']}] behind the name",
+        )
     sign = next((sign for sign in SIGNS if is_grouped(cell, sign)), None)
     if sign is None:
         return None

@@ -53,6 +53,15 @@ def test_a_text_among_numbers_is_named_with_its_row(tmp_path: Path, cell: str) -
     assert "is not a number" not in said(log(tmp_path / "b.csv"))
 
 
+def test_units_in_the_cells_are_named_and_refused(tmp_path: Path) -> None:
+    """Grafana's export writes them; one row may be in another unit than the next."""
+    note = said(log(tmp_path / "a.csv", NAMES[1], every=table()[NAMES[1]].map("{:.1f} km/h".format)))
+    assert "has its unit in the cell; write numbers alone, and [km/h] behind the name" in note
+    (tmp_path / "b.csv").write_text("time,ground_speed,wheel_speed_l\n0,3.2 km/h,1\n1,3.3 km/h,1\n")
+    with pytest.raises(InputError, match=r"has its unit in the cell"):
+        read(tmp_path / "b.csv")
+
+
 def test_signs_between_thousands_are_named(tmp_path: Path) -> None:
     grouped = (100 * table()[NAMES[6]]).map("{:,.1f}".format)
     note = said(log(tmp_path / "a.csv", NAMES[6], every=grouped))

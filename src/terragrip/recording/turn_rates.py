@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 _ALIKE = 0.95  # correlation of two rates of turn that are in proportion
 _SCRUBBED, _STEERED, _MOST = (
-    0.3,
+    0.1,
     0.7,
     1.25,
-)  # hubs over rims: skid-steered (measured: .45 to .62), steered, and at most
+)  # hubs over rims: skid-steered (measured: .45 to .62; a long one on a floor that grips turns by a fifth of that), steered, and at most
 _UNLIKE, _OFTEN = (
     0.1,
     0.1,
