@@ -336,3 +336,11 @@ def test_a_wheel_without_a_torque_is_held_against_the_vehicle_file(
     )
     assert expected in said
     assert bool(said) is bool(expected)
+
+
+def test_a_remark_of_numbers_that_ends_in_words_is_left_alone(tmp_path: Path) -> None:
+    """A block of a long file takes it for numbers, the next for texts."""
+    rows = [f"{0.01 * k:.2f},1.0{k % 7},5.0{k % 9},3" for k in range(100_000)]
+    text = "\n".join(["time,ground_speed,wheel_speed_fl,remark", *rows, "1000.00,1,5,slippery", ""])
+    (tmp_path / "log.csv").write_text(text)
+    assert "wheel_speed_fl" in inspect(tmp_path / "log.csv").proposals

@@ -226,8 +226,8 @@ class Seen:
                 columns, units, TimeColumn(TIME, "s"), base - first, clocks, since_1970=False, whole=whole
             )
         written = {n: v for n, c in log.columns.items() if (v := numbers_of(c)) is not None}
-        texts = {
-            n: c.tolist()
+        texts = {  # a block of them may hold numbers
+            n: [cell if isinstance(cell, str) else None for cell in c.tolist()]
             for n, c in log.columns.items()
             if c.dtype == object and n not in (*LABELS, *written)
         }
