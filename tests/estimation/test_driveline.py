@@ -164,6 +164,9 @@ def test_what_a_pto_takes_does_not_pull(tractor: tg.Vehicle) -> None:
     assert np.isfinite(unknown["slip_driven"]).all()
     assert "gap" not in unknown["event"]
     assert any("The PTO turns in 50% of the log" in note for note in unknown.notes)
+    unseen = replace(baling, channels={n: v for n, v in baling.channels.items() if n != "pto_speed"})
+    (leap,) = [note for note in tg.estimate(unseen, tractor).notes if " leaps " in note]
+    assert "a PTO or a pump took another part" in leap
     mowing = baling.with_channels(pto_speed=0 * log.time, pto_speed_front=baling["pto_speed"])
     np.testing.assert_array_equal(tg.estimate(mowing, tractor)["adhesion_driven"], unknown["adhesion_driven"])
     data = tractor.to_dict()

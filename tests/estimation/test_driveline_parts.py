@@ -244,6 +244,16 @@ def test_free_wheels_turn_as_measured_or_else_as_the_ground_goes_by() -> None:
         np.testing.assert_array_equal(drive.torque, own["drive_torque_driven"])
 
 
+def test_a_pto_on_the_bus_counts_though_the_earlier_log_had_none() -> None:
+    line = {"driveline": {"efficiency": 0.8, "efficiency_std": 0.04, "accessory_power": 0}}
+    bus = ("ground_speed", "engine_torque", "engine_speed", "wheel_speed_rl", "wheel_speed_rr")
+    known = DrivenMachine.of_file(tractor(**line), bus).to_dict()
+    machine = DrivenMachine.of_file(tractor(**line), (*bus, "pto_speed_front"), known)
+    sent = dict.fromkeys((*bus, "pto_speed_front"), np.full(2, 100.0))
+    channels = {name: sent[name] for name in machine.channels}
+    assert np.isnan(machine.converted(np.array([0.0, 0.1]), channels, 0)[1].std).all()
+
+
 def test_what_the_driveline_takes_widens_intervals_by_its_force_over_loads() -> None:
     """The spread of a torque over radius and load adds to adhesion's as independent ones do, and to a curve's scale in proportion, as
     though adhesion were .1 at least."""
