@@ -164,6 +164,9 @@ def test_a_log_without_a_learnt_sensor_or_too_short_and_a_foreign_classifier_are
     pd.read_csv(folder / "hard1.csv").head(5).to_csv(tmp_path / "body.csv", index=False)
     assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
     assert "too short for a window" in capsys.readouterr().err
+    pd.read_csv(folder / "hard1.csv").iloc[::4].to_csv(tmp_path / "body.csv", index=False)
+    assert main([*tell, "-c", str(folder / "grounds.npz")]) == 2
+    assert "sampled every 0.62 s, learned every 0.15 s, not used" in capsys.readouterr().err
     (tmp_path / "foreign.npz").write_bytes(b"PK")
     assert main([*tell, "-c", str(tmp_path / "foreign.npz")]) == 2
     assert "foreign.npz" in capsys.readouterr().err

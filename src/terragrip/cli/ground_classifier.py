@@ -203,6 +203,8 @@ def _judged(known: GroundClassifier, columns: Any, log: Path) -> pd.DataFrame:
         if length < window:
             problem = f"lasts {length:.3g} s, too short for a window of {window:.3g} s"
             raise InputError(problem, file=log, hint="give a longer log")
+        if slow := known.too_slow(columns):
+            raise InputError(" ".join(slow), file=log, hint="log faster, or train on logs of this rate")
         wanted = "; ".join(" + ".join(s) for s in known.sensors_[-3:])
         raise InputError("has none of the learned sensors", file=log, hint=f"give e.g. {wanted}")
     table = table.drop(columns="recording")

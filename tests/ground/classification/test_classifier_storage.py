@@ -126,7 +126,7 @@ def rewritten(content: bytes, path: Path, **changes: object) -> Path:
     ("changes", "expected"),
     [
         ({"version": 2}, "version 2"),
-        ({"version": 4}, "version 4"),
+        ({"version": 5}, "version 5"),
         ({"version": "x"}, "version 'x'"),
         ({"format": "a cake"}, "not a ground classifier"),
         ({"classes": ["hard"]}, "damaged"),

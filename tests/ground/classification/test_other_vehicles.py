@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from classifier_drives import BODY, GROUNDS, drive, drives
-from terragrip import GroundClassifier
+from terragrip import GroundClassifier, InputError
 from terragrip.ground.classification.labelled import read_labels
 
 pytestmark = pytest.mark.usefixtures("small_forests")
@@ -91,6 +91,43 @@ def test_the_words_in_wheels_names_do_not_matter() -> None:
         for wheels in (plain, worded)
     ]
     np.testing.assert_array_equal(*reported)
+
+
+def every(table: pd.DataFrame, rows: int) -> pd.DataFrame:
+    return table.iloc[::rows].reset_index(drop=True)
+
+
+def test_a_body_sensor_at_a_higher_rate_is_judged_at_that_of_training() -> None:
+    def slower(table: pd.DataFrame) -> pd.DataFrame:
+        at = np.flatnonzero(table[BODY[0]].notna())
+        return table.assign(**{name: table[name].where(np.isin(table.index, at[::4])) for name in BODY})
+
+    tables, labels = drives(TRAINED)
+    result = learnt([slower(table) for table in tables], labels)
+    assert result.score(*drives(HELD_OUT)) > 0.9
+
+
+def test_a_recording_too_slow_to_show_what_was_learned_is_unknown_and_why_is_said() -> None:
+    result = learnt(*wheels_only(TRAINED))
+    slow = every(wheels_only(HELD_OUT)[0][0].dropna(), 4)
+    assert (result.predict([slow]) == "unknown").all()
+    assert result.too_slow(slow)[0] == "wheel speed: sampled every 0.62 s, learned every 0.15 s, not used."
+    assert not result.too_slow(wheels_only(HELD_OUT)[0][0])
+
+
+def test_a_machine_that_drives_pulls_and_vibrates_three_times_as_much_is_unknown() -> None:
+    """Limited to the learned range, its features look like those of the ground that pulls and vibrates most."""
+    result = learnt(*drives(TRAINED))
+    measured = ["wheel_speed_left", "wheel_speed_right", "drive_torque_left", "drive_torque_right", *BODY]
+    other = [table.assign(**{name: 3 * table[name] for name in measured}) for table in drives(HELD_OUT)[0]]
+    assert (result.predict(other) == "unknown").mean() > 0.9
+
+
+def test_wheels_that_were_not_learned_are_of_another_vehicle() -> None:
+    result = learnt(*wheels_only(TRAINED))
+    four = wheels_only(HELD_OUT, ("left", "right", "rear_left", "rear_right"))[0]
+    with pytest.raises(InputError, match=r"rear_left, rear_right \(learned: left, right\)"):
+        result.predict(four)
 
 
 def test_a_very_short_run_beside_a_long_one_does_not_stop_the_training() -> None:

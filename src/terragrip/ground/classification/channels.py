@@ -28,6 +28,7 @@ PREFIXES = {
     "acceleration": ("acceleration_x", "acceleration_y", "acceleration_z"),
 }
 FAMILIES = tuple(PREFIXES)
+WHEELS = ("wheel speed", "torque")
 BODY = ("angular velocity", "acceleration")
 
 SAME_RATE = 1.2
@@ -86,6 +87,12 @@ def family_of(column: str) -> str | None:
 def wheel_of(column: str) -> str:
     """The wheel of a column such as ``drive_torque_<wheel>``."""
     return column.split("_", 2)[2]
+
+
+def wheels_of(recorded: Sequence[Signals]) -> tuple[str, ...]:
+    """The names of the wheels that any of some recordings has a speed, a torque or a current of, sorted."""
+    named = (channels for one in recorded for family, channels in one.families.items() if family in WHEELS)
+    return tuple(sorted({wheel_of(name) for channels in named for name in channels}))
 
 
 def tables_of(recordings: Any) -> list[Columns]:

@@ -12,7 +12,13 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
-from terragrip.ground.classification.channels import held_channels, shortest_period, signals_of, tables_of
+from terragrip.ground.classification.channels import (
+    held_channels,
+    shortest_period,
+    signals_of,
+    tables_of,
+    wheels_of,
+)
 from terragrip.ground.classification.comparable import not_comparable, rates_apart, without
 from terragrip.ground.classification.experts import FEWEST_WINDOWS, train_experts
 from terragrip.ground.classification.labels import UNKNOWN, classes_of, one_each
@@ -123,7 +129,11 @@ class GroundClassifier:
         experts, remarks = train_experts(training, classes, int(random.integers(2**31)))
         used = {name for expert in experts for name in expert.features}
         names = tuple(name for name in training.names if name in used)
-        return self._know(Learnt(classes, names, tuple(experts), layout, held, (*notes, *remarks), left_out))
+        return self._know(
+            Learnt(
+                classes, names, tuple(experts), layout, held, (*notes, *remarks), left_out, wheels_of(signals)
+            )
+        )
 
     def predict(self, recordings: Iterable[Any]) -> npt.NDArray[Any]:
         """The label (windows,) of each window, ``"unknown"`` where none fits; recordings follow one another.
@@ -164,6 +174,11 @@ class GroundClassifier:
         for k, name in enumerate(self.classes_):
             table[f"probability_{name}"] = chances[:, k]
         return table
+
+    def too_slow(self, recording: Any) -> list[str]:
+        """A sentence on each kind of sensor that is sampled too slowly in a recording to be judged. Raises InputError as `predict`."""
+        (table,) = tables_of([recording])
+        return self._known().too_slow(table)
 
     def score(self, recordings: Iterable[Any], labels: Sequence[Any]) -> float:
         """Share of windows whose label is that of their recording; unknown counts as wrong. Raises InputError."""

@@ -61,16 +61,18 @@ class Parts:
         return cls(scaling, machine, Discriminants.fit(points, codes), forest, law)
 
     def decide(self, names: tuple[str, ...], features: Floats) -> tuple[Floats, Floats]:
-        """Scores (parts, n, classes), the machine's first, and what makes windows strange (3, n), more being stranger."""
+        """Scores (parts, n, classes), the machine's first, and what makes windows strange (4, n), more being stranger."""
         roles = roles_of(names)
-        points = self.standardization.apply(features[:, roles.machine])
+        own = features[:, roles.machine]
+        points = self.standardization.apply(own)
         scores, distance = self.machine.decide(points)
         every = [scores]
         if self.forest is not None:
             every.append(self.forest.decide(features))
         if self.law is not None:
             every.append(self.law.decide(features[:, roles.motion], features[:, roles.effects]))
-        odd = np.stack([-scores.max(axis=1), distance, self.discriminants.distance(points)])
+        among = [-scores.max(axis=1), distance, self.discriminants.distance(points)]
+        odd = np.stack([*among, self.standardization.distance(own)])
         return np.stack(every), odd
 
 

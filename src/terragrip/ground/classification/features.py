@@ -45,6 +45,7 @@ from terragrip.ground.classification.windows import samples_in
 
 SPEED, TORQUE, GROUND, TURN, ACCELERATION = FAMILIES
 _BLOCK = 2000  # windows at a time bound the memory of a long drive
+_FEWEST = 5  # samples a window where training had more: with fewer, probabilities were worse than equal ones
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
         blocks = [features_of(signals, starts[k : k + _BLOCK], layout) for k in range(0, len(starts), _BLOCK)]
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     result: Table = {}
-    usable = {f: c for f, c in signals.families.items() if f in layout.period}
+    usable = {f: c for f, c in signals.families.items() if f in layout.period and dense(f, c, layout)}
     with np.errstate(invalid="ignore", divide="ignore"):
         speeds = _wheels(usable.get(SPEED, {}), starts, layout, SPEED)
         if speeds is not None:
@@ -117,9 +118,15 @@ def _named(sensors: str, features: Table) -> Table:
 
 
 def _period(family: str, channels: dict[str, Channel], layout: Layout) -> float:
-    """The trained period where the recording's is about that, else the recording's own."""
+    """The trained period, at which faster samples are taken; of slower ones their own."""
     own, trained = shortest_period(channels), layout.period[family]
-    return trained if 1 / SAME_RATE < own / trained < SAME_RATE else own
+    return trained if own < SAME_RATE * trained else own
+
+
+def dense(family: str, channels: dict[str, Channel], layout: Layout) -> bool:
+    """Whether a family's channels have samples enough in a window, or as many as in training."""
+    period = _period(family, channels, layout)
+    return period == layout.period[family] or layout.window >= _FEWEST * period
 
 
 def _stack(

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.ground.classification.channels import Columns, Signals, signals_of
+from terragrip.errors import InputError
+from terragrip.ground.classification.channels import Columns, Signals, shortest_period, signals_of, wheels_of
 from terragrip.ground.classification.comparable import without
 from terragrip.ground.classification.expert import Expert
-from terragrip.ground.classification.features import Layout, features_of
+from terragrip.ground.classification.features import Layout, dense, features_of
 from terragrip.ground.classification.neighbours import nearby_mean, smoothed
 from terragrip.ground.classification.training_set import PRESENT, matrix, measured_families
 from terragrip.ground.classification.windows import window_starts
@@ -33,8 +34,8 @@ class Judgement:
 @dataclass(frozen=True)
 class Learnt:
     """The classes, the features' names, the experts from most features to fewest, what recordings look like, the update
-    periods [s] of channels that are logged with repeats, sentences for the user, and beginnings of columns that
-    are left out."""
+    periods [s] of channels that are logged with repeats, sentences for the user, beginnings of columns that
+    are left out, and the names of the wheels (none in files of before 28 November 2026)."""
 
     classes: npt.NDArray[np.generic]
     features: tuple[str, ...]
@@ -43,18 +44,35 @@ class Learnt:
     held: Mapping[str, float]
     notes: tuple[str, ...]
     left_out: tuple[str, ...] = ()
+    wheels: tuple[str, ...] = ()
 
     def windows(self, table: Columns, step: float | None) -> Floats:
         """Starts (n,) [s] of a table's windows, ``step`` [s] apart; None: one window."""
         return self._starts(self._signals(table), step)
 
     def judge(self, table: Columns, step: float | None, smooth: float) -> Judgement:
-        """Judge a table's windows; neighbours within a time ``smooth`` [s] share their evidence."""
+        """Judge a table's windows; neighbours within a time ``smooth`` [s] share their evidence.
+
+        Raises InputError on a table with a wheel that no recording in training had.
+        """
         signals = self._signals(table)
+        strangers = [wheel for wheel in wheels_of([signals]) if wheel not in self.wheels]
+        if self.wheels and strangers:
+            problem = f"has wheels that were not learned: {', '.join(strangers)} (learned: {', '.join(self.wheels)})"
+            hint = "a classifier is of one vehicle; name the wheels as in training, or train one for this vehicle"
+            raise InputError(problem, file=table.name, hint=hint)
         starts = self._starts(signals, step)
         features = matrix(features_of(signals, starts, self.layout), self.features, len(starts))
         chances, novelty = self._ask(features, starts, smooth)
         return Judgement(starts, smoothed(chances, starts, smooth / 2), novelty)
+
+    def too_slow(self, table: Columns) -> list[str]:
+        """A sentence on each sensor family of a table that has too few samples in a window to be judged by what was learned."""
+        return [
+            f"{family}: sampled every {shortest_period(channels):.2g} s, learned every {self.layout.period[family]:.2g} s, not used."
+            for family, channels in self._signals(table).families.items()
+            if family in self.layout.period and not dense(family, channels, self.layout)
+        ]
 
     def _signals(self, table: Columns) -> Signals:
         return signals_of(without(table, self.left_out), self.held)

@@ -10,6 +10,10 @@ from terragrip.arrays import Floats, Ints
 from terragrip.ground.classification.neighbours import nearby_mean
 
 LEVELS: Floats = np.r_[0.0, np.geomspace(1e-4, 1.0, 400)]
+AMONG = 3
+"""The first kinds of oddness: of a place among the grounds' windows. What follows is of a place outside them all."""
+OUTSIDE = 3.0
+"""Standard deviations over known windows beyond which a distance is no known window's: another machine, speed or unit."""
 SPANS: Floats = np.array([0.0, 2.0, 5.0, 10.0, 20.0, 60.0])
 """Lengths of time [s] over which strangeness may be averaged; others lie between these."""
 
@@ -34,9 +38,13 @@ class Strangeness:
     def of(self, odd: Floats) -> Floats:
         """Strangeness (n,) of windows with this oddness (kinds, n).
 
-        Each kind is measured in its own standard deviations over known windows; their sum tells more than any.
+        Each kind is measured in its own standard deviations over known windows. Among the grounds the sum tells more than any kind;
+        outside, where limited features may look like any ground's, the distance beyond `OUTSIDE` counts besides, as much as all of
+        those. Files of before 28 November 2026 hold nothing of the outside.
         """
-        return np.asarray(((odd - self.usual[:, :1]) / self.usual[:, 1:]).sum(axis=0))
+        own = (odd[: len(self.usual)] - self.usual[:, :1]) / self.usual[:, 1:]
+        beyond = np.maximum(own[AMONG:] - OUTSIDE, 0.0).sum(axis=0)
+        return np.asarray(own[:AMONG].sum(axis=0) + AMONG * beyond)
 
     def novelty(self, strange: Floats, span: float) -> Floats:
         """Share (n,) of windows on known grounds, from runs not trained on, at least as strange over a span [s]; NaN stays."""

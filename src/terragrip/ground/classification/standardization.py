@@ -9,6 +9,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 
 _LIMIT = 3.5  # standard deviations: what lies further out gives no more evidence
+_FARTHEST = 100.0  # standard deviations: beyond any vehicle, and finite
 _TRUST = 0.5  # power of the ratio of variances
 
 
@@ -45,6 +46,12 @@ class Standardization:
     def apply(self, features: Floats) -> Floats:
         """Features (n, features) on one scale; what is not measured lies at the centre."""
         return scaled(features, self.centre, self.scale) * self.weight
+
+    def distance(self, features: Floats) -> Floats:
+        """Root mean square (n,) of the SDs between the measured ``features`` (n, features) and the centre, unlimited."""
+        measured = np.isfinite(features)
+        away = np.where(measured, np.minimum(np.abs(features - self.centre) / self.scale, _FARTHEST), 0.0)
+        return np.asarray(np.sqrt((away**2).sum(axis=1) / np.maximum(measured.sum(axis=1), 1)))
 
 
 def centre_of(features: Floats) -> Floats:

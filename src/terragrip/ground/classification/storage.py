@@ -31,7 +31,8 @@ from terragrip.ground.classification.standardization import Standardization
 Made = TypeVar("Made")
 
 FORMAT = "terragrip ground classifier"
-VERSION = 3
+VERSION = 4
+READ = (3, VERSION)  # 3: without the wheels' names and the strangeness of what lies outside
 
 
 _PARTS: dict[str, Any] = {
@@ -62,6 +63,7 @@ def save(parameters: Mapping[str, Any], learnt: Learnt, path: str | os.PathLike[
         "layout": {"window": float(layout.window), "period": layout.period, "size": layout.size},
         "held": dict(learnt.held),
         "left_out": list(learnt.left_out),
+        "wheels": list(learnt.wheels),
         "notes": list(learnt.notes),
         "experts": [
             {
@@ -96,7 +98,7 @@ def load(path: str | os.PathLike[str], make: Callable[[Mapping[str, Any], Learnt
             if not isinstance(header, dict) or header.get("format") != FORMAT:
                 raise _foreign(path)
             version = header.get("version")
-            if version != VERSION:
+            if version not in READ:
                 hint = "update terragrip, or train it again"
                 raise InputError(
                     f"is of version {version!r}, this Terragrip reads {VERSION}", file=path, hint=hint
@@ -166,6 +168,7 @@ def _learnt(header: dict[str, Any], archive: Any) -> Learnt:
         dict(header["held"]),
         tuple(str(note) for note in header["notes"]),
         tuple(str(begin) for begin in header.get("left_out", ())),  # files of before it mattered have none
+        tuple(str(wheel) for wheel in header.get("wheels", ())),
     )
 
 
