@@ -155,7 +155,7 @@ def test_a_fleet_of_two_machines_and_three_days(place: Path, capsys: pytest.Capt
 
 
 def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
-    """A log in km/h moves the fleet's means; its note was in summary.parquet alone."""
+    """A log in km/h has a note, and a mean slip that no machine can have counts in no mean."""
     log = place / "logs/b/drive4.csv"
     table = pd.read_csv(log)
     table["ground_speed"] *= 3.6
@@ -164,6 +164,23 @@ def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
     page = (place / "out/report.html").read_text()
     row = page[page.index("ground_speed may be in km/h") - 400 : page.index("ground_speed may be in km/h")]
     assert "drive4.csv" in row
+    summary = pd.read_parquet(place / "out/summary.parquet").set_index("log")
+    assert "no machine has a mean slip -0." in summary.loc["drive4.csv", "left_out"]
+    assert "drive4.csv" in page[page.index("Logs left out of the means") :]
+    assert summary["slip"].min() > 0
+    assert (summary["left_out"] != "").sum() == 1
+    assert "drive4.csv" not in set(pd.read_parquet(place / "out/soils.parquet")["log"])
+
+
+def test_a_log_with_another_machines_vehicle_file_counts_in_no_mean(place: Path, ran: Ran) -> None:
+    vehicle = place / "Heros.yaml"
+    vehicle.write_text(vehicle.read_text().replace("100 kg", "1 kg"))
+    code, out, _ = ran()
+    assert code == 0
+    assert "left out of means and curves: no machine has a mean adhesion" in out
+    summary = pd.read_parquet(place / "out/summary.parquet")
+    assert summary["adhesion"].isna().all()
+    assert summary["left_out"].str.contains("check its vehicle file").all()
 
 
 def test_a_second_call_does_what_is_new_or_changed_and_no_more(
@@ -235,9 +252,10 @@ def test_a_copy_of_a_log_is_named(place: Path, estimated: Path, ran: Ran) -> Non
     log = place / "logs/a/drive1.csv"
     (log.parent / "drive1 (copy).csv").write_bytes(log.read_bytes())
     assert ran()[0] == 0
-    notes = pd.read_parquet(estimated / "summary.parquet").set_index("log")["notes"]
-    assert "The log is a copy of drive1 (copy).csv: means and curves count both" in notes["drive1.csv"]
-    assert notes.str.contains("is a copy").sum() == 1
+    summary = pd.read_parquet(estimated / "summary.parquet").set_index("log")
+    assert list(summary.index[summary["left_out"] != ""]) == ["drive1.csv"]
+    assert summary.loc["drive1.csv", "left_out"] == "a copy of drive1 (copy).csv"
+    assert np.isnan(summary.loc["drive1.csv", "slip"])
 
 
 Refused = Callable[..., str]

@@ -195,6 +195,11 @@ def _lines(done: FleetResult, output: str) -> list[str]:
     lines += [f"  {log}: {reason}" for log, reason in list(done.failed.items())[:10]]
     if len(done.failed) > 10:
         lines.append(f"  and {len(done.failed) - 10} more in failures.parquet")
+    lines += [
+        f"  {log}: left out of means and curves: {why}" for log, why in list(done.left_out.items())[:10]
+    ]
+    if len(done.left_out) > 10:
+        lines.append(f"  and {len(done.left_out) - 10} more left out, in summary.parquet")
     if done.kept:
         kept = "1 log of earlier calls is" if done.kept == 1 else f"{done.kept} logs of earlier calls are"
         lines.append(f"{kept} kept.")

@@ -9,7 +9,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.fleet.store import Store
-from terragrip.fleet.tally import COUNTED, MEANS
+from terragrip.fleet.tally import COUNTED, MEANS, impossible
 from terragrip.fleet.task import NOTES, SAMPLES, Outcome, is_whole
 
 SUMMARY, FAILURES, BY_SOIL = "summary.parquet", "failures.parquet", "soils.parquet"
@@ -115,15 +115,22 @@ def _files(note: Note) -> set[str]:
     return {note["file"], *note.get("extra", {}).values()}
 
 
-def with_copies(notes: Sequence[Note]) -> list[Note]:
-    """The notes; those of logs with the content of a log before say so, for each counts in means and curves."""
+def with_left_out(notes: Sequence[Note]) -> list[Note]:
+    """The notes, each with the reason ``left_out`` in its summary ("": counted).
+
+    A copy of a log before and a log with a mean that no machine can have count in no mean and no curve: they have no means, no
+    rows by soil and no sample.
+    """
     first: dict[str, str] = {}
     result = []
     for note in notes:
         content, summary = note.get("content"), note["summary"]  # earlier calls kept no content
-        if content and first.setdefault(content, note["log"]) != note["log"]:
-            text = f"The log is a copy of {first[content]}: means and curves count both; remove one."
-            note = {**note, "summary": {**summary, "notes": f"{summary['notes']} {text}".lstrip()}}
+        copied = bool(content) and first.setdefault(str(content), note["log"]) != note["log"]
+        why = f"a copy of {first[str(content)]}" if copied else impossible(summary)
+        note = {**note, "summary": {**summary, "left_out": why}}
+        if why:
+            none = dict.fromkeys(MEANS)
+            note |= {"sample": False, "soils": [], "summary": {**note["summary"], **none}}
         result.append(note)
     return result
 
@@ -148,6 +155,7 @@ def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]
             ("nis", pa.float64()),
             *[(f"{name}_events", pa.int64()) for name in COUNTED],
             ("soils", pa.string()),
+            ("left_out", pa.string()),
             ("notes", pa.string()),
             ("cells", pa.int64()),
             ("no_map", pa.string()),

@@ -26,12 +26,14 @@ SLIPS = np.linspace(0.0, 0.6, 121)
 def report_of(notes: Sequence[Row], reasons: Mapping[str, str], curves: FleetCurves) -> str:
     """The report as one self-contained HTML document. Raises InputError if matplotlib or Jinja2 is missing."""
     rows = [{"log": note["log"], **note["summary"]} for note in notes]
+    counted = [row for row in rows if not row["left_out"]]
     soils = soil_rows(notes)
     sections = (
-        _by_vehicle(rows),
+        _by_vehicle(counted),
         _by_soil(soils, curves),
         _curves(curves),
-        _by_day(rows),
+        _by_day(counted),
+        _left_out(rows),
         _remarks(rows),
         _failures(reasons),
     )
@@ -50,6 +52,7 @@ def _lead(rows: Sequence[Row], reasons: Mapping[str, str]) -> str:
 
 def _headlines(rows: Sequence[Row], reasons: Mapping[str, str]) -> Iterator[Headline]:
     yield Headline(str(len(rows)), "logs", f"{len(reasons)} failed" if reasons else "none failed")
+    rows = [row for row in rows if not row["left_out"]]
     yield Headline(f"{_total(rows, 'moving_time') / 3600:.1f} h", "moving, without an event")
     yield Headline(f"{_total(rows, 'distance') / 1000:.1f} km", "driven")
     yield Headline(percent(weighted(rows, "slip")[0]), "slip", "mean over moving time")
@@ -181,6 +184,19 @@ def _remarks(rows: Sequence[Row]) -> Section:
     return Section(
         "notes", "Notes on the logs", content=(Table(caption, ("log", "logs", "notes"), tuple(cells)),)
     )
+
+
+def _left_out(rows: Sequence[Row]) -> Section:
+    """The logs in the data set that no mean counts, and why."""
+    listed = tuple((row["log"], row["vehicle"], row["left_out"]) for row in rows if row["left_out"])
+    if not listed:
+        return Section(
+            "left_out", "Logs left out of the means", omitted="None: every mean and curve counts all logs."
+        )
+    more = f" The first {MOST} of {len(listed)}; summary.parquet has all." if len(listed) > MOST else ""
+    caption = f"In no mean, sum or curve of this page; their estimates are in the data set.{more}"
+    table = Table(caption, ("log", "vehicle", "why"), listed[:MOST])
+    return Section("left_out", "Logs left out of the means", content=(table,))
 
 
 def _failures(reasons: Mapping[str, str]) -> Section:

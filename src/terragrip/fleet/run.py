@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from terragrip.errors import InputError
@@ -18,7 +18,7 @@ from terragrip.fleet.dataset import (
     Note,
     known_notes,
     settled,
-    with_copies,
+    with_left_out,
     write_tables,
     write_text,
 )
@@ -37,7 +37,8 @@ class FleetResult:
     """What a call did. ``estimated``: logs estimated now; ``unchanged``: logs whose estimates from an earlier call still hold; ``failed``:
     reasons by log, ``unwritten`` of them for lack of disk space; ``kept``: logs of earlier calls that this one did not name; ``noted``:
     logs named now whose estimates have notes. Of the logs
-    estimated now: ``rows``, ``restarts`` of the filter, and of each log ``nis`` over its expected value and the ``seconds`` of a worker."""
+    estimated now: ``rows``, ``restarts`` of the filter, and of each log ``nis`` over its expected value and the ``seconds`` of a worker.
+    ``left_out``: of the logs in the data set, why means and curves do not count them."""
 
     estimated: int
     unchanged: int
@@ -49,6 +50,7 @@ class FleetResult:
     restarts: int
     nis: tuple[float, ...]
     seconds: tuple[float, ...]
+    left_out: dict[str, str] = field(default_factory=dict)
 
 
 def run_fleet(
@@ -110,7 +112,7 @@ def run_fleet(
             except InputError as error:  # the workers are gone; still write the tables of what is done
                 stopped = error
             notes, reasons = settled(store, before, failed, outcomes)
-            notes = with_copies(notes)
+            notes = with_left_out(notes)
             _write(store, notes, reasons)
             if stopped is not None:
                 raise stopped
@@ -131,6 +133,7 @@ def run_fleet(
         restarts=sum(one["restart_events"] for one in fresh),
         nis=tuple(one["nis"] for one in fresh if one["nis"] is not None),
         seconds=tuple(one.seconds for one in outcomes if one.fresh),
+        left_out={note["log"]: why for note in notes if (why := note["summary"]["left_out"])},
     )
     counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
     emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,16 @@ PERIOD = 0.2
 """Interval between the rows that soils are learned from [s]; neighbouring rows carry the same information."""
 MEANS = ("ground_speed", "slip", "adhesion", "soil_resistance", "net_traction", "efficiency")
 """Quantities averaged over a log's time without an event; wheel columns are also averaged over the wheels."""
+POSSIBLE = {
+    "ground_speed": (-60.0, 60.0),
+    "slip": (-0.25, 1.0),
+    "adhesion": (-1.5, 1.5),
+    "soil_resistance": (-0.5, 1.0),
+    "net_traction": (-1.5, 1.5),
+    "efficiency": (-10.0, 1.1),
+}
+"""Least and greatest mean of a log that a machine can have: a wide margin about what tyres, tracks and soils do, for wrong units and
+another machine's vehicle file. Efficiency: near no power a mean is far below zero; none is above one, but for errors."""
 COUNTED = tuple(name for name in EVENTS if name)
 
 
@@ -133,6 +143,16 @@ def _mean_of(block: Estimates, name: str) -> Array:
         return block.columns[name]
     each = [block.columns[f"{name}_{wheel}"] for wheel in wheels_with(name, block.columns)]
     return np.mean(each, axis=0) if each else np.full(len(block), np.nan)
+
+
+def impossible(row: Mapping[str, Any]) -> str:
+    """The means of a log's row that no machine can have, with their values; empty if there are none."""
+    wrong = [
+        f"{name.replace('_', ' ')} {row[name]:.3g}"
+        for name, (low, high) in POSSIBLE.items()
+        if row[name] is not None and not low <= row[name] <= high
+    ]
+    return f"no machine has a mean {' and '.join(wrong)}: check its vehicle file and units" if wrong else ""
 
 
 def weighted(rows: Iterable[dict[str, Any]], name: str) -> tuple[float, float]:
