@@ -506,6 +506,7 @@ def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newto
         ("side_slope [deg]", None),
         ("GrossMass [kg]", "mass"),
         ("Bunkergewicht [t]", None),
+        ("Maschinengewicht [kg]", "mass"),
         ("Hakenkraft [kN]", "drawbar_force"),
         ("GPS_Height [m]", "altitude"),
         ("boom_height_m", None),

@@ -250,9 +250,12 @@ def _of_place(column: Column) -> list[Hint]:
     return []
 
 
+_OF_A_PART = re.compile(r"(?!gesamt|fahrzeug|maschine|traktor|schlepper).+(gewicht|masse)")
+
+
 def _is_compound(name: Name) -> bool:
     """Whether a mass is of what the word begins with: Bunkergewicht."""
-    return any(re.fullmatch(r"(?!gesamt|fahrzeug).+(gewicht|masse)", word) for word in name.words)
+    return any(_OF_A_PART.fullmatch(word) for word in name.words)
 
 
 def _of_speed(column: Column) -> list[Hint]:
