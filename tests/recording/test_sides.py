@@ -236,3 +236,16 @@ def test_a_furrow_wheel_that_slips_while_the_axle_pulls_is_no_radius() -> None:
     assert not any(said in note for note in side_warnings(furrow, vehicle(), log["angular_velocity_z"])[0])
     scaled = replace(log, channels=channels | {"wheel_speed_rr": 1.08 * rims})
     assert any(said in note for note in side_warnings(scaled, vehicle(), log["angular_velocity_z"])[0])
+
+
+def test_wheels_of_a_vehicle_that_is_dug_in_may_spin_unlike() -> None:
+    """Each as fast as its drive lets it, on ground that stands: no scale, radius or unit is wrong. (Simulated machines 9705 and 9729 of
+    the rolling chassis were accused.)"""
+    log = skidding()
+    rng, still = np.random.default_rng(1), log.time > 60
+    ground = np.where(still, 0.0, log.channels["ground_speed"]) + 0.02 * rng.standard_normal(len(log))
+    spun = np.where(still, 1.3, 1.0) * log.channels["wheel_speed_rl"]
+    notes = unit_warnings(log.with_channels(ground_speed=ground, wheel_speed_rl=spun), vehicle())
+    assert not [note for note in notes if "wheel_speed_" in note]
+    stuck = log.with_channels(ground_speed=0.02 * rng.standard_normal(len(log)))
+    assert not [note for note in unit_warnings(stuck, vehicle()) if "times the ground speed" in note]

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 _LEAST = 15  # windows of 2 s
 _DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
+_SPUN = (
+    0.5  # of the pace: wheels that leave a slower ground behind spin as their drive lets them, each by itself
+)
 _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _APART = 0.1  # the same, where only other axles show that it is straight: the furrow wheel of a plough slips .1 less
@@ -91,7 +94,7 @@ class Axle:
 @dataclass(frozen=True)
 class Drive:
     """Axles in windows (n,) with the middles ``when`` [s]: their mean ``pace`` and the difference of their ``hubs`` in turns [m/s],
-    whether they are ``driving``, and the sum of all turns (``turned``) [rad]."""
+    whether they are ``driving`` and do not spin, and the sum of all turns (``turned``) [rad]."""
 
     axles: tuple[Axle, ...]
     when: Floats
@@ -110,9 +113,11 @@ class Drive:
             return None
         pace = np.abs(np.mean([axle.rims for axle in axles], axis=(0, 1)))
         turned = WINDOW * float(np.abs(shown).sum())
-        return cls(
-            tuple(axles), when, pace, vehicle.track * shown, pace > _DRIVING * quantile(pace, 0.95), turned
-        )
+        driving = pace > _DRIVING * quantile(pace, 0.95)
+        if "ground_speed" in recording.channels:
+            ground = filled(recording.time, np.abs(recording.channels["ground_speed"]))
+            driving &= ~(np.interp(when, recording.time, ground) < _SPUN * pace)
+        return cls(tuple(axles), when, pace, vehicle.track * shown, driving, turned)
 
     @property
     def straight(self) -> Bools:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.held import known_part
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import RATIOS
 from terragrip.recording.turns import filled, straight_rows
@@ -43,6 +44,8 @@ _GAP = 1.0  # s, or three samples: nothing was measured within it
 
 def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Wheel speeds that are likely not in rad/s, or radii that are wrong, by the ground speed."""
+    if _stands(recording, max(vehicle.wheel_radius)):
+        return []
     result: dict[str, list[tuple[str, float]]] = {}
     straight = straight_rows(recording, vehicle)
     usual: dict[str, float] = {}
@@ -98,6 +101,12 @@ def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, 
     moving = rows & (rims[0] > 0.3 * top_speed(rims[0])) & (rims[1] > 0)
     low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
     return high < _ONE * low
+
+
+def _stands(recording: Recording, radius: float) -> bool:
+    """Whether the ground speed brings the vehicle nowhere, by a turn of a wheel: dug in, its ratio to the rims is that of noise."""
+    when, what = known_part(recording.time, recording.channels.get("ground_speed", np.empty(0)))
+    return len(what) > 1 and float(np.ptp(np.cumsum(what[1:] * np.diff(when)))) < 2 * np.pi * radius
 
 
 def drive_train_warnings(recording: Recording) -> list[str]:
