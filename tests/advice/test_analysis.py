@@ -157,6 +157,14 @@ def test_transport_alone_is_told_no_load():
     assert "next to nothing was pulled" in one.missing[0]
 
 
+def test_a_drive_whose_adhesion_is_never_known_is_told_so():
+    one = drive(metres=100)
+    one.columns.update(
+        {name: np.full(len(one), np.nan) for name in one.columns if name.startswith("adhesion_")}
+    )
+    assert "with its adhesion known" in only([one]).missing[0]
+
+
 def test_slip_above_the_best_is_never_told_to_load_more():
     """Pulls that come and go: their mean lies below the best pull, their mean slip above the best slip."""
     one = only([drive(top=0.25, metres=300)])

@@ -44,6 +44,8 @@ NO_LOAD = (
     "for advice on load, ballast and speed"
 )
 """Of drives with a drawbar sensor and nothing behind it: transport."""
+NO_ROW = "no row moves, unflagged, with its adhesion known and vehicle and tool on one soil"
+"""Of drives with nothing to advise on, as those in which a PTO takes an unknown part of the engine's power all along."""
 CURVE_END, CURVE_POINTS = 0.4, 41
 
 
@@ -81,8 +83,7 @@ def advise_samples(
     """As `advise`, of rows gathered by soil; ``wheels``: the driven ones of the tables, in the order of ``Samples.wheel_adhesion``."""
     found = {name: _of_soil(name, part, vehicle, wheels, soils or {}) for name, part in samples.items()}
     if not found:
-        nothing = "no row moves, unflagged, with vehicle and tool on one soil: drive some tens of metres"
-        return {"": Advice("", missing=(nothing,))}, {"": 0.0}
+        return {"": Advice("", missing=(f"{NO_ROW}: drive some tens of metres",))}, {"": 0.0}
     return found, {name: part.way for name, part in samples.items()}
 
 

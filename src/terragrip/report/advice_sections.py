@@ -76,7 +76,7 @@ class GatheredAdvice:
 
     def section(self) -> Section:
         """The chapter, or why there is none."""
-        from terragrip.advice.analysis import advise_samples
+        from terragrip.advice.analysis import NO_ROW, advise_samples
         from terragrip.advice.slip_only import advise_rows
 
         missed = tuple(f"Left out of the advice: {run}, for {why}." for run, why in self.left_out.items())
@@ -84,9 +84,7 @@ class GatheredAdvice:
             return of_slip(advise_rows(self.rows, self.known), missed)
         by_soil = {} if self.samples is None else self.samples.by_soil()
         if self.samples is None or not by_soil:
-            why = next(
-                iter(self.left_out.values()), "no row moves, unflagged, with vehicle and tool on one soil"
-            )
+            why = next(iter(self.left_out.values()), NO_ROW)
             return Section("advice", TITLE, omitted=f"Left out: {why}.")
         vehicle = self.samples.vehicle
         advice, way = advise_samples(by_soil, vehicle, self.wheels)
