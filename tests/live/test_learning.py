@@ -167,13 +167,14 @@ def test_memory_is_bounded_and_its_moments_become_rarer(vehicle, monkeypatch):
         ("ground_speed", "ground_speed never came"),
     ],
 )
-def test_a_channel_that_never_comes_is_named(vehicle, long, lost, words):
+@pytest.mark.parametrize("learn", [True, False], ids=["learned", "settings of an earlier log"])
+def test_a_channel_that_never_comes_is_named(vehicle, long, lost, words, learn):
     """Rows go on being estimated, and all of them are gaps: nothing else shows that one name was not that of the vehicle's."""
     rows = [
         (t, {n: v for n, v in sample.items() if not n.startswith(lost)})
         for t, sample in rows_of(long.recording)
     ]
-    core = Core(vehicle, Settings(("udp://test",)))
+    core = Core(vehicle, Settings(("udp://test",), learn=learn))
     outputs = [out for time, values in rows[:1100] for out in core.process(time, 0, time, values)]
     assert [out.text for out in outputs if isinstance(out, Event) and words in out.text]
     assert {out.estimate.event for out in outputs if isinstance(out, Row) and out.estimate.time > 3} == {

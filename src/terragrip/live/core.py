@@ -150,9 +150,8 @@ class Core:
             self.ground = LiveGround(estimator, self.library)
         return estimator
 
-    def _learner(self, estimator: TractionEstimator) -> SettingsLearner | None:
-        if not self.settings.learn:
-            return None
+    def _learner(self, estimator: TractionEstimator) -> SettingsLearner:
+        """What learns; where nothing is to be learned it still finds what never came and what contradicts itself."""
         inputs = estimator.engine.inputs
         return SettingsLearner(estimator.vehicle, inputs, self.settings.noise, self.settings.held)
 
@@ -266,8 +265,7 @@ class Core:
                 kind = "units" if name == "rims" else "contradiction"
                 out += [Event(row.time, kind, "estimator", note) for note in notes]
             out += self._absent(row.time, learned.absent)
-        changes = learned.changes(estimator) if learned is not None else []
-        if learned is None or not changes:
+        if learned is None or not self.settings.learn or not (changes := learned.changes(estimator)):
             return
         learned.apply(estimator)
         text = f"from {learned.seconds:.0f} s of the drive: {'; '.join(changes)}"
@@ -369,8 +367,7 @@ class Core:
         result.estimator = restored(snapshot) if snapshot else None
         if result.estimator is not None and state["learner"] is not None:
             result.learner = result._learner(result.estimator)
-            if result.learner is not None:
-                result.learner.restore(state["learner"])
+            result.learner.restore(state["learner"])
         result.clocks = [SourceClock.from_state(one) for one in state["clocks"]]
         result.counts = Counts.from_state(state["counts"])
         result.reorder.counts = result.counts
