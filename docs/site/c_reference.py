@@ -35,7 +35,7 @@ def page() -> str:
         raise SystemExit(f"{HEADER}: no comment at its top, or no section of declarations")
     about = re.sub(r"^ \* ?", "", top[1], flags=re.MULTILINE).strip()
     about = re.sub(r"\b(tg_\w+\*?|TG_\w+)", r"`\1`", about)
-    parts = ["# C", about, "How to compile and call it on a controller: [kernel.md](kernel.md)."]
+    parts = ["# C", about, "How to compile and call it on a controller: [controller.md](controller.md)."]
     for title, code in _sections(body[1]):
         parts += [f"## {title}", f"```c\n{code.strip()}\n```"]
     return "\n\n".join(parts) + "\n"

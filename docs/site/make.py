@@ -50,6 +50,7 @@ CONTENTS: dict[str, list[str]] = {
         "report",
         "studio",
         "live",
+        "controller",
         "simulation",
     ],
     "Reference": [

@@ -85,6 +85,7 @@ SIGNS = {
     "engine_friction_share": "of the reference torque (J1939: nominal friction percent torque), positive",
     "engine_reference_torque": "what the shares are of (J1939: engine reference torque)",
     "pto_speed": "of a power take-off; while it turns it takes the `pto_power` of the vehicle file's `driveline`",
+    "pto_speed_front": "the same, of a power take-off in front",
     "drawbar_force": "horizontal force of the tool on the machine, backward positive; absent: nothing is towed",
     "hitch_load": "vertical force of the tool on the machine's hitch, down positive; absent: nothing hangs there",
     "mass": "of the whole machine, without what is towed; absent: the vehicle file's throughout",

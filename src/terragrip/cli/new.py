@@ -11,6 +11,7 @@ import typer
 from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file
 from terragrip.errors import InputError
+from terragrip.files import replacing
 
 if TYPE_CHECKING:
     from terragrip.vehicle_maker import Made
@@ -174,6 +175,32 @@ def vehicle(
     made.save(output)
     if not quiet:
         print(_said(made))
+        print(f"Written to {output}")
+
+
+@app.command("controller")
+def controller(
+    estimates: Annotated[
+        Path, typer.Argument(metavar="ESTIMATES", help="A Parquet file written by 'terragrip estimate'.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The new header (.h).")],
+    quiet: Quiet = False,
+) -> None:
+    """Make a C header for a controller.
+
+    It declares the settings with which the kernel (C99) computes the same estimates there: the vehicle, method, noise and held channels of
+    ESTIMATES.
+    """
+    from terragrip.estimation import Estimates
+    from terragrip.estimation.c_header import c_header, estimator_of
+
+    target = check_file(output, [estimates], suffixes=(".h",))
+    estimator = estimator_of(Estimates.read_about(estimates), str(estimates))
+    with replacing(target) as beside:
+        beside.write_text(
+            c_header(estimator, f"Of {estimates.name}: {estimator.vehicle.name}."), encoding="utf-8"
+        )
+    if not quiet:
         print(f"Written to {output}")
 
 

@@ -109,9 +109,13 @@ class Engine:
     @property
     def standstill_speed(self) -> float:
         """Below it vehicle and wheels count as standing [m/s]: as it was set, else by the machine's size."""
+        return float(self.settings().standstill_speed)
+
+    def settings(self) -> Any:
+        """A copy of the tg_settings in use."""
         settings = ffi.new("tg_settings *")
         lib.tg_estimator_settings(self.handle, settings)
-        return float(settings.standstill_speed)
+        return settings
 
     def update(self, time: float, sample: Mapping[str, Any]) -> int:
         """Process a sample into ``self.estimate``; returns tg_status. Raises struct.error on what is no number."""
