@@ -8,11 +8,11 @@ have RTK positions (2 cm), a quarter errors of .1 m with .3 m of drift, a quarte
 the working width, two in three the antenna. A map is made by default.
 
 The truth of a cell is the mean over 6 x 6 points of it: of adhesion the soil's curve at the map's slip (wheels sunk in as that slip
-makes them), of resistance that at the drive's median slip, times the ground's own variation. mapped: cells with an adhesion, of those
-with a resistance. held: cells whose 90 % interval holds the truth, mean of
-the machines, and in brackets that of the worst. error: root mean
-square over the truth's mean, median of the machines. real: listed anomalies whose cells are in truth beyond the medians of what is
-around on each side, in that direction and by half or more of what they are by the map's values.
+makes them), of resistance that at the drive's median slip (of the way: a machine that got stuck spins), times the ground's own
+variation. mapped: cells with an adhesion, of those with a resistance. held: cells whose 90 % interval holds the truth, mean of the
+machines, and in brackets that of the worst. error: root mean square over the truth's mean, median of the machines. real: listed
+anomalies whose cells are in truth beyond the medians of what is around on each side, in that direction and by half or more of the
+difference listed.
 found: patches so by 15 % or more of the mean that an anomaly of their sign overlaps. --write puts the table into docs/maps.md.
 """
 
@@ -31,6 +31,7 @@ from pyproj import Transformer
 from marked import put
 from terragrip.estimation import estimate
 from terragrip.maps import FieldMap, map_of
+from terragrip.maps.values import driven_slip
 from terragrip.physics.adhesion import CURVES
 from terragrip.simulation import Scenario, simulate
 from terragrip.simulation.families import Kind, machines, scenario
@@ -180,9 +181,7 @@ def score(drive: Drive) -> dict[str, Any]:
     result = simulate(drive.scenario, drive.seed)
     estimates = estimate(result.recording, result.vehicle)
     made = map_of([("drive", estimates)])
-    wheels = [wheel for wheel in estimates.wheels if f"slip_{wheel}" in estimates.columns]
-    slip = float(np.nanmedian([np.nanmedian(estimates[f"slip_{wheel}"]) for wheel in wheels]))
-    ground = Ground(drive, made.epsg, (made.reference_slip, slip))
+    ground = Ground(drive, made.epsg, (made.reference_slip, driven_slip(estimates)))
     row: dict[str, Any] = {"cell": made.cell, "width": drive.width, "counts": np.zeros(4, dtype=int)}
     for quantity in QUANTITIES:
         if quantity not in made.cells:
@@ -200,8 +199,7 @@ def anomalies(made: FieldMap, ground: Ground, quantity: str, true: Floats) -> np
     plot = ground.at(*((place + 0.5) * made.cell).T)[1]
     real = 0
     for one in listed:
-        said, holds = (np.sign(one.difference) * beyond(place, one.cells, x) for x in (cells.value, true))
-        real += bool(holds > 0 and holds >= 0.5 * said)
+        real += bool(np.sign(one.difference) * beyond(place, one.cells, true) >= 0.5 * abs(one.difference))
     patches, found = 0, 0
     for k in range(1, len(ground.drive.scenario.route.plots)):
         inside_ = np.flatnonzero(plot == k)
@@ -231,8 +229,8 @@ def line(name: str, rows: list[dict[str, Any]]) -> str:
     sizes = [sum(len(one[0]) for one in known[q]) for q in QUANTITIES]
     words.append(f"{100 * sizes[0] / max(sizes[1], 1):.0f} %")
     for some in known.values():
-        shares = [float(held.mean()) for held, _, _ in some if len(held) >= ENOUGH]
-        errors = [float(np.sqrt(np.mean(error**2)) / true.mean()) for _, error, true in some]
+        shares = [float(held.mean()) for held, _, _ in some if len(held) >= ENOUGH] or [np.nan]
+        errors = [float(np.sqrt(np.mean(error**2)) / true.mean()) for _, error, true in some] or [np.nan]
         words.append(f"{100 * np.mean(shares):.0f} ({100 * min(shares):.0f}) %")
         words.append(f"{np.median(errors):.2f}")
     listed, real, patches, found = sum(row["counts"] for row in rows)

@@ -53,8 +53,8 @@ def fill_map(folder: Path, cells: int = CELLS) -> None:
 
     values = {
         name: Cells(
-            column, row, rng.normal(0.4, 0.05, many), rng.uniform(0.01, 0.05, many), even(0.01), even(20), even(2), even(0), even(0.0),
-            even(0.0),
+            column, row, rng.normal(0.4, 0.05, many), rng.uniform(0.01, 0.05, many), even(0.01)[:, None], even(20), even(2), even(0),
+            even(0.0), even(0.0),
         )
         for name in made.cells
     }  # fmt: skip

@@ -66,6 +66,18 @@ def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
     assert np.median(made.cells["adhesion"].value) == pytest.approx(REFERENCE, rel=0.15)
 
 
+def test_stretches_without_demand_on_the_ground_leave_the_other_cells_as_certain() -> None:
+    one = drive(*lanes(6, 40, 2), noise=0.01)
+    before = map_of([("a", one)], MapSettings(reference_slip=0.1)).cells["adhesion"]
+    rng, idle = np.random.default_rng(1), one["distance"] % 40 < 6
+    for wheel in one.wheels:
+        one.columns[f"slip_{wheel}"] = np.where(idle, 0.002 * rng.standard_normal(len(idle)), 0.1)
+        one.columns[f"adhesion_{wheel}"][idle] = 0.03 + 0.02 * rng.standard_normal(int(idle.sum()))
+    after = map_of([("a", one)], MapSettings(reference_slip=0.1)).cells["adhesion"]
+    assert len(before) > len(after) > 100
+    assert np.median(after.std) < 3 * np.median(before.std)
+
+
 def test_a_cell_lies_where_the_wheels_were_not_the_antenna() -> None:
     ground = drive(*lanes(3, 30, 3), a=lambda e, n: np.where(e < 15, 0.5, 1.0), antenna=(3.0, 1.0))
     made = map_of([("a", ground)], MapSettings(cell=1.0))
@@ -197,6 +209,32 @@ def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
     assert np.any(
         np.abs(local_east(found[(found.quantity == "adhesion") & (found.kind == "grips")]) - 30) < 1
     )
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_strip_of_another_soil_along_the_edge_is_no_patch(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    waves = rng.normal(0, 0.5, (40, 2)), rng.uniform(0, 6.3, 40)
+
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
+        return np.where(north > 16.5, 1.2, 1.0) * (1 + 0.015 * own)
+
+    made = map_of([("a", drive(*lanes(20, 60, 1), a=ground, noise=0.01, seed=seed))])
+    assert not any(one.difference > 0 for one in made.anomalies["adhesion"])
+
+
+def test_ground_driven_at_another_slip_is_no_anomaly_where_its_curve_may_bend_otherwise() -> None:
+    """One soil of another form than the paper's: carried to the reference from below it is too high, from above it too low."""
+    east, north = lanes(20, 40, 1)
+    one, curve = drive(east, north), CURVES["burckhardt"]
+    slip = np.where((np.abs(east - 20) < 4) & (np.abs(north - 10) < 3), 0.15, 0.07)
+    for wheel in one.wheels:
+        one.columns[f"slip_{wheel}"] = slip
+        one.columns[f"adhesion_{wheel}"] = np.asarray(curve.value(slip, {}))
+    made = map_of([("a", one)], MapSettings(reference_slip=0.1))
+    assert np.ptp(made.cells["adhesion"].value) > 0.1
+    assert not made.anomalies["adhesion"]
 
 
 def test_change_between_days_is_significant_where_it_is_one() -> None:

@@ -31,8 +31,8 @@ LEAST_CELLS = 2
 
 @dataclass(frozen=True)
 class Anomaly:
-    """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, the value ``around``,
-    the ``difference`` with its ``std``, and ``p``, the smallest p-value of its cells."""
+    """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, the value ``around``
+    nearest to it, the ``difference`` with its ``std``, and ``p``: the smallest of its cells, or that of the difference if larger."""
 
     cells: Ints
     column: float
@@ -48,7 +48,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     """Patches of cells unlike their surroundings, the strongest first.
 
     A cell's residual is its distance beyond the medians of its surroundings on each side. Residuals of neighbours are combined by inverse
-    variance; what constants weigh more in them than around is added to it. The null is the scatter of such scores about the nearest
+    variance; what each constant weighs more in them than around is added to it. The null is the scatter of such scores about the nearest
     of those medians (their 68 % quantile; Efron 2004: most of a field is no anomaly), so soil that varies as it does everywhere is not an
     anomaly, and a field of two soils is not one whose soil varies. At most `share` of the cells, and of the listed patches by their
     smallest p, are due to chance.
@@ -60,12 +60,13 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
         return []
     place = np.column_stack([cells.column, cells.row]).astype(float)
     tree = cKDTree(place)
-    around, nearest, middle = _around(tree, place, cells.value, cells.constant)
+    around, nearest, middle = _around(tree, place, cells.value, cells.constants)
     variance = np.maximum(cells.std**2 - cells.constant**2, 1e-12)
+    constants = cells.constants - middle
     beyond, spread = _joined(tree, place, cells.value - around, variance)
     plain, _ = _joined(tree, place, cells.value - nearest, variance)
-    shared, _ = _joined(tree, place, cells.constant - middle, variance)
-    spread = np.hypot(spread, shared)
+    shared = [_joined(tree, place, one, variance)[0] for one in constants.T]
+    spread = np.hypot.reduce([spread, *shared])
     known = np.isfinite(plain) & np.isfinite(beyond)
     if known.sum() < AROUND:
         return []
@@ -73,7 +74,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     score = beyond / spread / max(scale, 1.0)
     p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
     patches = [
-        _anomaly(patch, cells, place, around, variance, p)
+        _anomaly(patch, cells, place, constants, spread * max(scale, 1.0), p)
         for patch in _patches(tree, place, significant(p, share), score)
     ]
     listed = significant(np.array([one.p for one in patches]), share, int(known.sum()))
@@ -93,9 +94,9 @@ def significant(p: Floats, share: float, tests: int | None = None) -> Bools:
     return chosen
 
 
-def _around(tree: Any, place: Floats, value: Floats, constant: Floats) -> tuple[Floats, Floats, Floats]:
-    """The expected value of each cell (n,), the median of that of its four sides which is nearest to its value, and that of the constants
-    around it.
+def _around(tree: Any, place: Floats, value: Floats, constants: Floats) -> tuple[Floats, Floats, Floats]:
+    """The expected value of each cell (n,), the median of that of its four sides which is nearest to its value, and those of the constants
+    (n, K) around it.
 
     The first is the cell's value clipped to the range of the medians of the surrounding cells on the sides. At the border of two
     soils one side agrees with it, so a border is no anomaly; a value between the sides' medians agrees with its surroundings.
@@ -120,8 +121,9 @@ def _around(tree: Any, place: Floats, value: Floats, constant: Floats) -> tuple[
     known = (near.sum(axis=1) >= AROUND // 2) & np.isfinite(low)
     away = np.abs(np.array(sides) - value)
     nearest = np.array(sides)[np.where(np.isfinite(away), away, np.inf).argmin(axis=0), np.arange(len(value))]
-    middle = np.full(len(place), np.nan)
-    middle[known] = np.nanmedian(np.where(near, constant[index], np.nan)[known], axis=1)
+    middle = np.full(constants.shape, np.nan)
+    for one, out in zip(constants.T, middle.T, strict=True):
+        out[known] = np.nanmedian(np.where(near, one[index], np.nan)[known], axis=1)
     return np.where(known, np.clip(value, low, high), np.nan), np.where(known, nearest, np.nan), middle
 
 
@@ -158,11 +160,32 @@ def _patches(tree: Any, place: Floats, chosen: Bools, score: Floats) -> list[Int
 
 
 def _anomaly(
-    patch: Ints, cells: Cells, place: Floats, around: Floats, variance: Floats, p: Floats
+    patch: Ints, cells: Cells, place: Floats, constants: Floats, spread: Floats, p: Floats
 ) -> Anomaly:
-    weight = 1 / variance[patch]
-    value, base = (float(np.average(x[patch], weights=weight)) for x in (cells.value, around))
+    """A patch against the cells around it as a whole: those of its cells reach past the rest of a narrow strip, which is no patch."""
+    from scipy.special import ndtr
+
+    weight = 1 / np.maximum(cells.std[patch] ** 2 - cells.constant[patch] ** 2, 1e-12)
+    value, *shared = np.average(
+        np.column_stack([cells.value, constants])[patch], axis=0, weights=weight
+    ).tolist()
+    base = _beside(patch, cells, place, value)
+    std = float(np.hypot.reduce([1 / np.sqrt(weight.sum()), *shared]))
+    whole = 2 * ndtr(-abs(value - base) / np.median(spread[patch]))
     column, row = place[patch].mean(axis=0) + 0.5
     return Anomaly(
-        patch, float(column), float(row), value, base, value - base, float(1 / np.sqrt(weight.sum())), float(p[patch].min())
-    )  # fmt: skip
+        patch, float(column), float(row), value, base, value - base, std, float(max(p[patch].min(), whole))
+    )
+
+
+def _beside(patch: Ints, cells: Cells, place: Floats, value: float) -> float:
+    """A patch's value clipped to the range of the medians of the cells on its sides, those that touch it left out."""
+    from scipy.spatial import cKDTree
+
+    middle = place[patch].mean(axis=0)
+    offset = place - middle
+    near = np.hypot(*offset.T) < np.hypot(*offset[patch].T).max() + 2 * CORE
+    near &= cKDTree(place[patch]).query(place)[0] > SMOOTH
+    sides = [near & (sign * offset[:, axis] > 0) for axis in (0, 1) for sign in (-1, 1)]
+    medians = [float(np.median(cells.value[side])) for side in sides if side.sum() >= SIDE]
+    return float(np.clip(value, min(medians), max(medians))) if medians else value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,9 +34,9 @@ VAGUE_X = 0.35
 class Pieces(Columns):
     """Consecutive rows of one reading in one part of a cell, as arrays (m,).
 
-    ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` driven; ``x``, ``y`` and their
-    five SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The signs of x and y
-    are reversed for braked wheels.
+    ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` driven; ``x``, ``y``, their
+    constants (m, K) and SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The
+    signs of x, y and constants are reversed for braked wheels.
     """
 
     column: Ints
@@ -45,10 +46,10 @@ class Pieces(Columns):
     metres: Floats
     x: Floats
     y: Floats
-    constant: Floats
+    constants: Floats
+    x_constants: Floats
     local: Floats
     random: Floats
-    x_constant: Floats
     x_random: Floats
     rows: Ints
     headland: Bools
@@ -56,19 +57,25 @@ class Pieces(Columns):
 
 @dataclass(frozen=True)
 class Cells(Columns):
-    """Cells of one quantity (k,), or of its passes: grid ``column`` and ``row``, ``value``, ``std``, ``constant`` (the part of ``std`` that
-    all cells share), ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland`` share of the distance."""
+    """Cells of one quantity (k,), or of its passes: grid ``column`` and ``row``, ``value``, ``std``, ``constants`` (k, K): the part of it
+    that all cells share, by constant and with sign; ``count`` of rows, ``passes``; ``run``, ``time`` of the first pass; ``headland``
+    share of the distance."""
 
     column: Ints
     row: Ints
     value: Floats
     std: Floats
-    constant: Floats
+    constants: Floats
     count: Ints
     passes: Ints
     run: Ints
     time: Floats
     headland: Floats
+
+    @property
+    def constant(self) -> Floats:
+        """The SD (k,) of what all cells share."""
+        return np.asarray(np.linalg.norm(self.constants, axis=1))
 
 
 def pieces_of(reading: Reading, time: Floats, way: Floats, size: float, run: int, headland: Bools) -> Pieces:
@@ -82,14 +89,17 @@ def pieces_of(reading: Reading, time: Floats, way: Floats, size: float, run: int
     step = np.diff(way, prepend=way[:1])[rows]
 
     def total(values: Floats) -> Floats:
-        return np.asarray(np.add.reduceat(step * values[rows], begin)) if len(begin) else np.zeros(0)
+        return _sums((step * values[rows].T).T, begin)
 
     y = total(reading.y)
     turned = np.where(y < 0, -1.0, 1.0) if reading.turns else np.ones(len(y))
+    constants, x_constants = (
+        turned[:, None] * total(values) for values in (reading.constants, reading.x_constants)
+    )
     pieces = Pieces(
         column[begin], line[begin], np.full(len(begin), run), time[rows][begin], total(np.ones(len(time))), turned * total(reading.x),
-        turned * y, total(reading.constant), total(reading.local), total(reading.random), total(reading.x_constant),
-        total(reading.x_random), np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
+        turned * y, constants, x_constants, total(reading.local), total(reading.random), total(reading.x_random),
+        np.diff(np.r_[begin, len(rows)]), headland[rows][begin],
     )  # fmt: skip
     return pieces.where(pieces.metres > 0)
 
@@ -115,6 +125,11 @@ def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     return whole, each
 
 
+def _sums(values: npt.NDArray[Any], begin: Ints) -> npt.NDArray[Any]:
+    """Sums of values (n, ...) from each place of `begin` to the next."""
+    return np.asarray(np.add.reduceat(values, begin, axis=0) if len(begin) else values[:0])
+
+
 def _starts(*columns: npt.NDArray[np.generic]) -> Bools:
     new = np.zeros(len(columns[0]), dtype=bool)
     new[:1] = True
@@ -124,36 +139,41 @@ def _starts(*columns: npt.NDArray[np.generic]) -> Bools:
 
 
 def _scatter(pieces: Pieces, cell: Ints) -> float:
-    """K [y² m]: the variance of y - value x over a metre, over all cells with two pieces or more."""
+    """K [y² m]: the variance of y - value x over a metre, over all cells with two pieces or more and a value: without demand on the
+    ground y/x is any number."""
     if not len(cell):
         return 0.0
-    x = np.bincount(cell, pieces.x)
-    value = np.divide(np.bincount(cell, pieces.y), x, out=np.zeros(len(x)), where=x > 0)
-    freedom = len(cell) - len(x)
+    x, metres = np.bincount(cell, pieces.x), np.bincount(cell, pieces.metres)
+    known = x > LEAST_X * metres
+    value = np.divide(np.bincount(cell, pieces.y), x, out=np.zeros(len(x)), where=known)
+    rows = known[cell]
+    freedom = int(rows.sum()) - int(known.sum())
     if freedom <= 0:
         return 0.0
-    return float(np.sum((pieces.y - value[cell] * pieces.x) ** 2 / pieces.metres) / freedom)
+    return float(np.sum(((pieces.y - value[cell] * pieces.x) ** 2 / pieces.metres)[rows]) / freedom)
 
 
 def _summed(pieces: Pieces, start: Bools, scatter: float, correlated: float, passes: Ints) -> Cells:
     begin = np.flatnonzero(start)
 
     def total(values: Floats) -> Floats:
-        return np.asarray(np.add.reduceat(values, begin)) if len(begin) else np.zeros(0)
+        return _sums(values, begin)
 
     metres, x = total(pieces.metres), total(pieces.x)
     safe = np.where(x > 0, x, np.nan)
     value = total(pieces.y) / safe
     x_share = total(pieces.x_random) / safe
     random = np.hypot(total(pieces.random) / safe, value * x_share)
-    constant = np.hypot(total(pieces.constant) / safe, value * total(pieces.x_constant) / safe)
+    constants = (total(pieces.constants).T - value * total(pieces.x_constants).T) / safe
     once = np.minimum(1.0, correlated / np.maximum(metres, 1e-9))
     local = total(pieces.local) / safe
-    std = np.sqrt(np.maximum(scatter * metres / safe**2, random**2 * once) + local**2 + constant**2)
-    rows = np.add.reduceat(pieces.rows, begin).astype(np.int64) if len(begin) else np.zeros(0, dtype=np.int64)
+    std = np.sqrt(
+        np.maximum(scatter * metres / safe**2, random**2 * once) + local**2 + np.sum(constants**2, axis=0)
+    )
+    rows = _sums(pieces.rows, begin).astype(np.int64)
     headland = total(pieces.metres * pieces.headland) / np.maximum(metres, 1e-9)
     cells = Cells(
-        pieces.column[begin], pieces.row[begin], value, std, constant, rows, passes, pieces.run[begin], pieces.time[begin], headland
+        pieces.column[begin], pieces.row[begin], value, std, constants.T, rows, passes, pieces.run[begin], pieces.time[begin], headland
     )  # fmt: skip
     known = (metres > LEAST_WAY) & (x > LEAST_X * metres) & (x_share * np.sqrt(once) < VAGUE_X)
     return cells.where(known)

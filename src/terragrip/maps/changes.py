@@ -51,9 +51,9 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
     several = end > begin
     first, last = order[begin[several]], order[end[several]]
     variance = passes.std**2 - (passes.constant**2 if same_machine else 0.0)
-    left = passes.constant[last] - passes.constant[first] if same_machine else 0.0
+    left = np.sum((passes.constants[last] - passes.constants[first]) ** 2, axis=1) if same_machine else 0.0
     difference = passes.value[last] - passes.value[first]
-    std = np.sqrt(np.maximum(variance[first] + variance[last] + left**2, 1e-18))
+    std = np.sqrt(np.maximum(variance[first] + variance[last] + left, 1e-18))
     p = 2 * ndtr(-np.abs(difference) / std)
     same = passes.run[first] == passes.run[last]
     return Changes(

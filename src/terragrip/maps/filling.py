@@ -47,10 +47,10 @@ def filled(cells: Cells, reach: float) -> Cells:
         )
     value, variance = _kriged(place, cells.value, np.median(cells.std**2 - cells.constant**2), wanted)
     none = np.zeros(len(wanted), dtype=np.int64)
-    constant = np.full(len(wanted), float(np.median(cells.constant)))
+    constant = float(np.median(cells.constant))
     nearest = tree.query(wanted)[1]
     new = Cells(
-        wanted[:, 0], wanted[:, 1], value, np.sqrt(variance + constant**2), constant, none, none, cells.run[nearest],
+        wanted[:, 0], wanted[:, 1], value, np.sqrt(variance + constant**2), cells.constants[nearest], none, none, cells.run[nearest],
         np.full(len(wanted), np.nan), cells.headland[nearest],
     )  # fmt: skip
     return Cells.joined([cells, new])

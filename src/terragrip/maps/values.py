@@ -50,9 +50,10 @@ FORMS = ("exponential", "burckhardt", "pacejka", "brixius", "wismer_luth")
 class Reading:
     """One quantity read at one place of the vehicle, row by row (n,).
 
-    ``east``, ``north`` [m]; ``x``, ``y`` as in the module's docstring; ``constant``, ``x_constant``: SDs of their errors that all rows
-    share; ``local``: of y's that rows nearby share; ``random``, ``x_random``: SDs of the rest, as the estimator states them; ``good``:
-    rows that count; ``turns``: x and y change sign together where a wheel brakes.
+    ``east``, ``north`` [m]; ``x``, ``y`` as in the module's docstring; ``constants``, ``x_constants`` (n, K): by how much each of K
+    constants that all rows share changes them, with sign, if it is off by one SD; ``local``: SD of y's error that rows nearby share;
+    ``random``, ``x_random``: SDs of the rest, as the estimator states them; ``good``: rows that count; ``turns``: x and y change sign
+    together where a wheel brakes.
     """
 
     quantity: str
@@ -60,17 +61,26 @@ class Reading:
     north: Floats
     x: Floats
     y: Floats
-    constant: Floats
+    constants: Floats
+    x_constants: Floats
     local: Floats
     random: Floats
-    x_constant: Floats
     x_random: Floats
     good: Bools
     turns: bool = False
 
 
 def usual_slip(estimates: Estimates) -> float:
-    """The one of `REFERENCE_SLIPS` next to the slip at which the driven wheels worked, in the median of their way."""
+    """The one of `REFERENCE_SLIPS` next to `driven_slip`, the last where that is not known."""
+    middle = driven_slip(estimates)
+    if np.isnan(middle):
+        return REFERENCE_SLIPS[-1]
+    apart = np.abs(np.log(np.array(REFERENCE_SLIPS) / max(middle, 1e-3)))
+    return REFERENCE_SLIPS[int(apart.argmin())]
+
+
+def driven_slip(estimates: Estimates) -> float:
+    """The slip [-] at which the driven wheels worked, in the median of their way; NaN where no row shows it."""
     counted = np.isin(estimates["event"].astype(str), COUNTED)
     step = np.diff(np.maximum.accumulate(np.nan_to_num(estimates["distance"])), prepend=0.0)
     wheels = [estimates[f"slip_{wheel}"] for _, wheel, _, _ in _driven(estimates, estimates.vehicle)]
@@ -78,11 +88,7 @@ def usual_slip(estimates: Estimates) -> float:
     known = np.isfinite(slip) & (metres > 0)
     order = np.argsort(slip[known])
     way = np.cumsum(metres[known][order])
-    if not len(way):
-        return REFERENCE_SLIPS[-1]
-    middle = slip[known][order][np.searchsorted(way, 0.5 * way[-1])]
-    apart = np.abs(np.log(np.array(REFERENCE_SLIPS) / max(float(middle), 1e-3)))
-    return REFERENCE_SLIPS[int(apart.argmin())]
+    return float(slip[known][order][np.searchsorted(way, 0.5 * way[-1])]) if len(way) else np.nan
 
 
 def readings_of(
@@ -96,23 +102,26 @@ def readings_of(
     for i, wheel, forward, left in _driven(estimates, vehicle):
         place = places.of(forward, left)
         slip, slip_std = estimates[f"slip_{wheel}"], estimates[f"slip_{wheel}_std"]
-        slip_constant = radius * (1 - np.abs(slip))
+        by_radius = np.minimum(radius * (1 - np.abs(slip)), slip_std)
         if f"adhesion_{wheel}" in estimates.columns:
             mu, mu_std = estimates[f"adhesion_{wheel}"], estimates[f"adhesion_{wheel}_std"]
-            constant = _torque_constant(vehicle, mu, i)
             value, slope, doubt = form(slip)
-            x = value, np.hypot(slope * slip_constant, doubt), np.hypot(slope * slip_std, doubt)
-            yield _reading("adhesion", place, mu, constant, mu_std, counted, x)
+            none = np.zeros(len(slip))
+            x_constants = np.column_stack([none, none, slope * by_radius, doubt])
+            x_random = slope * np.sqrt(slip_std**2 - by_radius**2)
+            constants = _adhesion_constants(vehicle, mu, i)
+            yield _reading(
+                "adhesion", place, mu, constants, mu_std, counted, x=(value, x_constants, x_random)
+            )
         if f"efficiency_{wheel}" in estimates.columns:
             eta, eta_std = estimates[f"efficiency_{wheel}"], estimates[f"efficiency_{wheel}_std"]
-            yield _reading("efficiency", place, eta, eta_std, eta_std, counted)
-        yield _reading("slip", place, slip, slip_constant, slip_std, counted)
+            yield _reading("efficiency", place, eta, eta_std[:, None], eta_std, counted)
+        yield _reading("slip", place, slip, by_radius[:, None], slip_std, counted)
     if estimates.has_adhesion and "soil_resistance" in estimates.columns:
-        rho = estimates["soil_resistance"]
+        rho, std = estimates["soil_resistance"], estimates["soil_resistance_std"]
         centre = places.of(float(np.mean(vehicle.axle_to_rear[vehicle.wheel_axle])), 0.0)
-        constant, local = _resistance_constant(vehicle, estimates)
-        std = estimates["soil_resistance_std"]
-        yield _reading("soil_resistance", centre, rho, constant, std, counted, local=local)
+        constants, local = _resistance_constants(vehicle, estimates)
+        yield _reading("soil_resistance", centre, rho, constants, std, counted, local=local)
 
 
 def _driven(estimates: Estimates, vehicle: Vehicle) -> Iterator[tuple[int, str, float, float]]:
@@ -131,50 +140,51 @@ def _reading(
     quantity: str,
     place: tuple[Floats, Floats],
     y: Floats,
-    constant: Floats,
+    constants: Floats,
     std: Floats,
     counted: Bools,
     x: tuple[Floats, Floats, Floats] | None = None,
     local: float = 0.0,
 ) -> Reading:
-    """`std` and the third of `x` (value, constant SD, SD) are whole SDs; the constant and local parts are subtracted from them."""
+    """`std` is y's whole SD; the constant and local parts, no more than it, are subtracted. `x`: value, constants, random SD."""
     turns = x is not None
     if x is None:
-        x = np.ones(len(y)), np.zeros(len(y)), np.zeros(len(y))
-    constant, x_constant = np.minimum(constant, std), np.minimum(x[1], x[2])
-    rest, x_random = (np.sqrt(np.maximum(w**2 - c**2, 0.0)) for w, c in ((std, constant), (x[2], x_constant)))
+        x = np.ones(len(y)), np.zeros_like(constants), np.zeros(len(y))
+    together = np.linalg.norm(constants, axis=1)
+    constant = np.minimum(together, std)
+    constants = constants * np.divide(constant, together, out=np.zeros(len(y)), where=together > 0)[:, None]
+    rest = np.sqrt(np.maximum(std**2 - constant**2, 0.0))
     near = np.minimum(local, rest)
     random = np.sqrt(rest**2 - near**2)
     good = counted & np.isfinite(place[0]) & np.isfinite(x[0]) & np.isfinite(y) & (std < WIDEST_STD)
-    return Reading(quantity, *place, x[0], y, constant, near, random, x_constant, x_random, good, turns)
+    return Reading(quantity, *place, x[0], y, constants, x[1], near, random, x[2], good, turns)
 
 
-def _torque_constant(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
-    """SD of adhesion's error from the constants that are uncertain in the vehicle file: mu = T/(r F_z)."""
+def _adhesion_constants(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
+    """What one SD of the vehicle file's constants changes in adhesion, mu = T/(r F_z) (n, 4): shares of it, the torque's zero, the
+    radius, and the curve's form, which is an error of x alone."""
     known = vehicle.uncertainty
     share = np.hypot.reduce([
-        known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0,
-        known.vertical_load or 0.0, known.mass or 0.0, known.wheel_radius or 0.0,
+        known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0, known.vertical_load or 0.0, known.mass or 0.0,
     ])  # fmt: skip
-    load = vehicle.axle_mass[vehicle.wheel_axle[wheel]] / np.sum(
-        vehicle.wheel_axle == vehicle.wheel_axle[wheel]
-    )
+    axle = vehicle.wheel_axle[wheel]
+    load = vehicle.axle_mass[axle] / np.sum(vehicle.wheel_axle == axle)
     offset = (known.drive_torque_offset or 0.0) / (vehicle.wheel_radius[wheel] * load * STANDARD_GRAVITY)
-    return np.asarray(np.hypot(share * mu, offset))
+    return np.column_stack([share * mu, np.full(len(mu), offset), -(known.wheel_radius or 0.0) * mu, 0 * mu])
 
 
-def _resistance_constant(vehicle: Vehicle, estimates: Estimates) -> tuple[Floats, float]:
-    """SD of rho_s's error from the same constants: rho_s = mean mu - (drawbar + m a)/(m g) - slope, and that from a slope which
-    nothing measures: the same over a hill's length, and of the other sign on the way back."""
-    known, count = vehicle.uncertainty, len(vehicle.wheels)
-    mean = np.mean([np.abs(estimates[f"adhesion_{wheel}"]) for wheel in estimates.wheels], axis=0)
+def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Floats, float]:
+    """What one SD of the same constants changes in rho_s = mean mu - (drawbar + m a)/(m g) - slope (n, 2): shares of the thrust, and
+    zeros; and the SD of a slope which nothing measures: the same over a hill's length, and of the other sign on the way back."""
+    known, driven = vehicle.uncertainty, max(int(np.sum(vehicle.driven)), 1)
+    mean = np.mean([estimates[f"adhesion_{wheel}"] for wheel in estimates.wheels], axis=0)
     weight = vehicle.mass * STANDARD_GRAVITY
     share = np.hypot.reduce([
-        (known.drive_torque_gain or 0.0) / np.sqrt(count), known.drive_torque_gain_common or 0.0,
+        (known.drive_torque_gain or 0.0) / np.sqrt(driven), known.drive_torque_gain_common or 0.0,
         known.mass or 0.0, known.wheel_radius or 0.0,
     ])  # fmt: skip
     offset = (
-        (known.drive_torque_offset or 0.0) * np.sqrt(count) / (float(vehicle.wheel_radius.mean()) * weight)
+        (known.drive_torque_offset or 0.0) * np.sqrt(driven) / (float(vehicle.wheel_radius.mean()) * weight)
     )
     force = (known.drawbar_offset or 0.0) / weight
     slope, local = known.slope or 0.0, 0.0
@@ -185,14 +195,16 @@ def _resistance_constant(vehicle: Vehicle, estimates: Estimates) -> tuple[Floats
         slope = min(slope or np.inf, known.acceleration_bias / STANDARD_GRAVITY)
     elif "pitch" not in channels:
         slope, local = 0.0, slope
-    return np.asarray(np.sqrt((share * mean) ** 2 + offset**2 + force**2 + slope**2)), local
+    zeros = float(np.hypot.reduce([offset, force, slope]))
+    return np.column_stack([share * mean, np.full(len(mean), zeros)]), local
 
 
 def _form(
     estimates: Estimates, reference: float, library: SoilLibrary | None
 ) -> Callable[[Floats], tuple[Floats, Floats, Floats]]:
     """The function of slip (n,) that gives x, dx/ds and the SD of x for want of the soil's form: each row's soil by its curve in the
-    library, else the paper's prototype, which is as far from the soil's as the usual `FORMS` are from each other."""
+    library, else the paper's prototype, which is as far from the soil's as the usual `FORMS` are from each other. A soil that bends
+    otherwise is wrong to one side above the reference and to the other below it: so is that SD's sign."""
 
     def usual(name: str, slip: Floats) -> Floats:
         return np.asarray(CURVES[name].value(slip, {}) / CURVES[name].value(reference, {}))
@@ -200,7 +212,8 @@ def _form(
     def form(slip: Floats) -> tuple[Floats, Floats, Floats]:
         prototype = CURVES["exponential"]
         x, slope = usual("exponential", slip), prototype.slope(slip, {}) / prototype.value(reference, {})
-        doubt = np.std([usual(name, slip) for name in FORMS], axis=0)
+        apart = np.std([usual(name, slip) for name in FORMS], axis=0)
+        doubt = apart * np.sign(slip) * np.where(np.abs(slip) < reference, -1.0, 1.0)
         if library is not None and "soil" in estimates.labels:
             labels = estimates.labels["soil"]
             for name in set(labels) & set(library):
