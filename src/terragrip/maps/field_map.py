@@ -180,7 +180,7 @@ class MapMaker:
                 "no row with a position shows the ground",
                 hint="drive, with positions",
             )
-        if len(cells.get("adhesion", ())) < 0.5 * len(cells.get("soil_resistance", ())):
+        if len(cells.get("adhesion", ())) < WORTH_A_WORD * len(cells.get("soil_resistance", ())):
             self.notes.append(
                 f"adhesion: {len(cells.get('adhesion', ()))} of {len(cells['soil_resistance'])} cells; in the others slip was too low or "
                 "too uncertain to show it. Take larger cells (--cell), or map the same ground with more pull."
