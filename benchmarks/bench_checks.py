@@ -2,12 +2,12 @@
 
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
-The limits are those of recording/codes.py, pace.py, frozen.py, dropouts.py, stretches.py, copies.py, replays.py, rest.py,
-torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART, torques.py's least
-thrust, level_shift.py's, rescaled.py's and leaps.py's, and the stretch of mechanics.py. Right logs are development drives of three chassis
-(sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data; a false alarm is a log
-of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that have negative ones); one
-is found where its own note comes.
+The limits are those of recording/codes.py, pace.py, frozen.py, cut.py, turns.py, dropouts.py, stretches.py, copies.py, replays.py,
+rest.py, torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART and _SPUN,
+torques.py's least thrust, those of level_shift.py, rescaled.py and leaps.py, and the stretch of mechanics.py. Right logs are development
+drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data;
+a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that
+have negative ones); one is found where its own note comes.
 
 --write puts the table into docs/formats.md.
 """
@@ -43,6 +43,8 @@ LIMITS = {
     "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
     "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
     "frozen": "_TIMES _FINE _NOISY _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
+    "cut": "_SHARE _LEAST _OFTENER _TIMES _FINE _NOISY",
+    "turns": "SURE LEAST_TURN _CLEAR _SIZES _WIDE _OTHER _SURELY",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
     "rest": "_STILL _ROLLING_OUT _SHIFT _SURE _ALIKE",
@@ -56,11 +58,17 @@ LIMITS = {
     "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
     "leaps": "_LEAST _BEYOND _SURE _HALF _REST",
     "mechanics": "_STRETCH",
-    "sides": "_APART",
+    "sides": "_APART _SPUN",
     "rolling": "_PULLING _MOST _RADII_SURE _SLOWER_LEAST",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
-SHARES = {("pace", "_OFTEN"), ("rolling", "_MOST"), ("turn_rates", "_ALIKE")}
+SHARES = {
+    ("turns", "_CLEAR"),
+    ("turns", "_SURELY"),
+    ("pace", "_OFTEN"),
+    ("rolling", "_MOST"),
+    ("turn_rates", "_ALIKE"),
+}
 """Of which the distance to 1 is halved and doubled."""
 
 TURNS = ("angular_velocity_z", "latitude", "longitude")
@@ -180,6 +188,14 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         "wheel 0 for 8 s",
         "while the vehicle drives",
         changed(log, f"wheel_speed_{vehicle.wheels[0]}", by=lambda v: np.where(late, 0.0, v)),
+        vehicle,
+    )
+    first = log.channels[torques[0]]
+    most = float(np.nanquantile(first, 0.9))
+    yield (
+        "torque cut",
+        "and never more",
+        log.with_channels(**{torques[0]: np.fmin(first, most) + 0 * first}),
         vehicle,
     )
     yield (
