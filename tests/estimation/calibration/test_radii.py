@@ -9,9 +9,11 @@ import pytest
 
 from terragrip.estimation import calibrate
 from terragrip.estimation.calibration.radii import WINDOW, Rolling, rolling_radii
+from terragrip.estimation.calibration.result import Unknown
 from terragrip.estimation.calibration.windows import windows
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
+from window_table import table
 
 WHEELS = ("fl", "fr", "rl", "rr")
 Make = Callable[..., Recording]
@@ -95,6 +97,17 @@ def test_without_a_zero_pull_pass_there_is_a_reason(drive: Make, vehicle: Vehicl
     result = calibrate(drive(120, slip=(0.1, 0.3)), vehicle)
     assert "wheel_radius fl" not in result
     assert any(u.name == "wheel_radius" and "zero pull" in u.why for u in result.unknown)
+
+
+def test_driven_wheels_that_always_pull_hard_have_no_radius(vehicle: Vehicle) -> None:
+    """Nothing is towed, but on soft ground the driven axle pushes the other one as hard all along."""
+    data = vehicle.to_dict()
+    data["axles"]["front"]["driven"] = False
+    torque = np.array([0.0, 0.0, 30.0, 30.0]) * np.ones((60, 1))
+    passes = table(60, slip=0.0, drawbar=np.zeros(60), torque=torque)
+    result = rolling_radii(passes, Vehicle.from_dict(data), np.arange(60), [""])
+    assert isinstance(result, Unknown)
+    assert result.why == "no zero-pull window has a plausible adhesion"
 
 
 def test_a_soil_without_a_zero_pull_pass_says_nothing(drive: Make, vehicle: Vehicle) -> None:

@@ -130,13 +130,13 @@ def _by_soils(
     block: Ints,
 ) -> tuple[Floats, Floats, float, float] | None:
     """The scale of the radii (w,), its variance, the steepness at zero pull, and on how many blocks these rest, by a curve for each
-    ``soil`` (n,); None without a window at zero pull."""
+    ``soil`` (n,); None without a window at zero pull, or of some wheel without any of little adhesion."""
     soils = sorted(set(soil[free]))
     code = np.array([soils.index(label) if label in soils else -1 for label in soil])
     driving = adhesion[:, vehicle.driven] if vehicle.driven.any() else adhesion
     most = np.array([_most(driving[passes & (code == j)]) for j in range(len(soils))])
     used = passes[:, None] & (code >= 0)[:, None] & (np.abs(adhesion) < _LOW * most[code][:, None])
-    if not used[free].any():
+    if not (used[free].any() and used.any(axis=0).all()):
         return None
     scale, own, steepness, stretches = _fit(windows, vehicle, adhesion, code, most, used, block)
     return scale, own, float(np.average(steepness[code[free]])), stretches
