@@ -47,23 +47,26 @@ def _cut(name: str, time: Floats, values: Floats) -> list[str]:
     when, what = known_part(time, values)
     if len(what) < 2 * _LEAST:
         return []
-    kinds, counts = np.unique(what, return_counts=True)
+    ends = []
+    for value, beyond in ((what.min(), "less"), (what.max(), "more")):
+        at = what == value
+        times, comes = np.count_nonzero(at), np.count_nonzero(at[1:] & ~at[:-1])
+        if times >= max(_LEAST, _SHARE * len(what)) and comes >= _TIMES:
+            ends.append((float(value), beyond, times))
+    if not ends:  # of most channels that is known already
+        return []
+    counts = np.unique(what, return_counts=True)[1]
     size = quantile(np.abs(what), 0.95)
     if (
-        len(kinds) < _LEAST
+        len(counts) < _LEAST
         or quantum(what) > _FINE * size
         or (white_noise(when, what) or 0.0) < _NOISY * size
     ):
         return []
     most = float(counts[1:-1].max())
-    notes = []
-    for end, beyond in ((0, "less"), (-1, "more")):
-        at = what == kinds[end]
-        comes = np.count_nonzero(at[1:] & ~at[:-1])
-        if counts[end] < max(_LEAST, _SHARE * len(what), _OFTENER * most) or comes < _TIMES:
-            continue
-        notes.append(
-            f"{name} is {kinds[end]:.4g} in {counts[end] / len(what):.0%} of the driving and never {beyond}: the range of its sensor or "
-            "column ends there, and what was beyond is lost. Take a wider range, or leave these cells empty; a motor's own limit may stay."
-        )
-    return notes
+    return [
+        f"{name} is {value:.4g} in {times / len(what):.0%} of the driving and never {beyond}: the range of its sensor or "
+        "column ends there, and what was beyond is lost. Take a wider range, or leave these cells empty; a motor's own limit may stay."
+        for value, beyond, times in ends
+        if times >= _OFTENER * most
+    ]

@@ -198,8 +198,9 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     lasting = when[np.r_[first[1:], len(what)] - 1] - when[first]
     rows = lasting >= max(_SECOND, _RUN * median(np.diff(when[first])))
     rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
-    is_resolved = quantum(what) < _RESOLVED * (white_noise(when, what) or 0.0)
-    if rows.sum() < _OFTEN or not is_resolved or not _is_restless(time, values):
+    if rows.sum() < _OFTEN or not _is_restless(time, values):
+        return []
+    if quantum(what) >= _RESOLVED * (white_noise(when, what) or 0.0):
         return []
     k = int(np.argmax(rows))
     return [
