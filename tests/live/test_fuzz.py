@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -97,3 +99,12 @@ def test_any_damage_to_a_write_ahead_file(tmp_path_factory, data):
     result = list(reading)
     assert result == whole[: len(result)]
     assert reading.good <= max(cut, len(MAGIC))
+
+
+def test_numbers_of_numpy_come_back(tmp_path: Path) -> None:
+    wal = WriteAhead(tmp_path / "wal.log")
+    wal.add("S", (1.0, 0, 1.0, {"ground_speed": np.float32(0.5), "engine_speed": np.int64(3)}))
+    wal.close()
+    assert list(Reading(tmp_path / "wal.log")) == [
+        ("S", [1.0, 0, 1.0, {"ground_speed": 0.5, "engine_speed": 3.0}])
+    ]

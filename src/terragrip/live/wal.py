@@ -36,7 +36,7 @@ class WriteAhead:
 
     def add(self, kind: str, content: Any = None) -> None:
         """A frame of a kind, as `Reading` gives it back."""
-        data = json.dumps((kind, content)).encode()
+        data = json.dumps((kind, content), default=float).encode()  # a decoder may give numbers of NumPy
         self._buffer += (_HEAD.pack(len(data), zlib.crc32(data)), data)
 
     def write(self) -> None:
