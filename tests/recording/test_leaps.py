@@ -100,6 +100,13 @@ def test_a_tool_that_comes_in_or_out_at_once_and_a_vehicle_that_coasts_are_no_er
     assert notes(coasting, vehicle) == []
 
 
+def test_a_torque_in_coarse_steps_has_one_step_more_and_no_moved_zero(vehicle: Vehicle) -> None:
+    """A pull that grows slowly, torques in steps of 20 N m: where one changes, the motion does not answer."""
+    columns = drive(vehicle, 150 + 1.5 * TIME)
+    coarse = {name: 20 * np.round(columns[name] / 20) for name in TORQUES}
+    assert not any("leaps" in note for note in notes(columns | coarse, vehicle))
+
+
 def test_a_wheel_on_rough_ground_whose_soil_changes_is_no_moved_zero(vehicle: Vehicle) -> None:
     """A wheel's torque leaps all the time where the ground is rough; there resistance falls by .04, and all torques with it."""
     columns = drive(vehicle)

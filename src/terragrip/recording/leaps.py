@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.held import known_part
+from terragrip.recording.held import known_part, quantum
 from terragrip.recording.mechanics import PULL
 from terragrip.recording.noise import MAD_TO_SD
 from terragrip.recording.ranks import median, quantile
@@ -32,6 +32,7 @@ _SLOWEST = 0.15  # s between samples, 10 Hz with jitter: within more a speed con
 _SURE = 5.0  # standard deviations of its steps: no sample of a log leaps so far by chance
 _LEAST = 0.05  # of the weight, or `PULL` beyond twice the next: leaps of right logs were .038 and 1.6 times at most (six on 156 drives)
 _BEYOND = 3.0  # standard deviations of what the balance is left with all the time, as soil and hills change
+_STEPS = 1.5  # of a channel's resolution: one step of it is no leap
 _HALF = 0.5  # of it, at least, is between two samples
 _REST = 0.25  # of it, at most, is answered, or gone again
 
@@ -131,6 +132,8 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
     leaps = calm[3:] - calm[:-3]
     rows = (np.abs(leaps) > _SURE * MAD_TO_SD * median(np.abs(leaps))) & (np.diff(when)[2:-2] <= _SLOWEST)
     rows &= np.abs(steps[2:-2] - leaps) < _HALF * np.abs(leaps)
+    if rows.any():
+        rows &= np.abs(leaps) > _STEPS * quantum(what)
     at = when[
         3:-2
     ]  # on rough ground, or pulling hard, a wheel's torque leaps more than in the rest of the drive
