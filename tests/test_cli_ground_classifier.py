@@ -55,7 +55,9 @@ def test_drives_never_seen_are_told_in_a_table_of_windows(
     np.testing.assert_allclose(np.diff(first), 0.5)
 
 
-def test_another_log_of_the_drive_adds_its_sensors(tmp_path: Path) -> None:
+def test_another_log_of_the_drive_adds_its_sensors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A body sensor logged in a file of its own, named by the table's third column and by --with."""
     rows = []
     for ground in GROUNDS:
@@ -79,6 +81,13 @@ def test_another_log_of_the_drive_adds_its_sensors(tmp_path: Path) -> None:
     alone, both = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("alone", "both"))
     assert len(alone) == len(both)
     assert not np.allclose(alone["novelty"], both["novelty"])
+    capsys.readouterr()
+    seldom = pd.read_csv(tmp_path / "loose0.csv").iloc[
+        ::5
+    ]  # the body sensor alone is judged, and the rest is named
+    seldom.to_csv(tmp_path / "loose0.csv", index=False)
+    assert main([*tell, *with_body, "-o", str(tmp_path / "slow.csv")]) == 0
+    assert "wheel speed: sampled every" in capsys.readouterr().out
 
 
 def test_labels_may_be_a_column_of_the_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -83,6 +83,20 @@ def test_estimates_that_need_more_than_the_kernel_are_refused(
     assert not (tmp_path / "x.h").exists()
 
 
+def test_smoothed_estimates_and_names_that_are_one_in_capitals_are_refused(
+    made: tuple[Path, tg.Estimates, tg.Recording],
+) -> None:
+    about = tg.Estimates.read_about(made[0] / "estimates.parquet")
+    with pytest.raises(tg.InputError, match="smoothed"):
+        estimator_of({**about, "smooth": True}, "")
+    vehicle = {
+        **about["vehicle"],
+        "axles": {"front": {"mass": 54, "wheels": ["w", "W"]}, "rear": {"mass": 85, "wheels": ["rl", "rr"]}},
+    }
+    with pytest.raises(tg.InputError, match="case only"):
+        estimator_of({**about, "vehicle": vehicle}, "")
+
+
 def test_numbers_come_back_to_the_last_bit(made: tuple[Path, tg.Estimates, tg.Recording]) -> None:
     folder, _, _ = made
     estimator = estimator_of(tg.Estimates.read_about(folder / "estimates.parquet"), "")

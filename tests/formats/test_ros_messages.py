@@ -229,3 +229,12 @@ def test_a_text_that_is_none_costs_its_message_alone(tmp_path: Path) -> None:
     table = read_table(tmp_path / "log.bag")
     assert len(table.columns["/pull.wrench.force.x"]) == 99
     assert "/pull: 1 messages cannot be read and were left out." in table.notes
+
+
+def test_an_integer_beyond_all_numbers_leaves_the_others_in_their_places() -> None:
+    """JSON has integers of any size."""
+    topic = Topic("t", None)
+    for k, value in enumerate((1, 10**400, 2)):
+        topic.push(float(k), b"", lambda _, value=value: (None, {"t.x": value}))
+    assert topic.strange == 1
+    np.testing.assert_array_equal(np.array(topic._columns["t.x"].numbers), [1.0, np.nan, 2.0])

@@ -6,9 +6,11 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from terragrip.errors import InputError
 from terragrip.formats import Profile
 from terragrip.formats.nmea_sentences import sentences
 from terragrip.live.decode import Decoder
@@ -108,3 +110,11 @@ def test_numbers_of_numpy_come_back(tmp_path: Path) -> None:
     assert list(Reading(tmp_path / "wal.log")) == [
         ("S", [1.0, 0, 1.0, {"ground_speed": 0.5, "engine_speed": 3.0}])
     ]
+
+
+def test_a_write_ahead_file_of_another_version_is_refused_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "wal.log"
+    path.write_bytes(b"TGWAL2\r\n" + bytes(40))
+    with pytest.raises(InputError, match="another version"):
+        Reading(path)
+    assert path.stat().st_size == 48

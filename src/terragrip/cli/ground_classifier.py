@@ -127,18 +127,22 @@ def predict(
         known.set_params(rejection=rejection)
     known.check_parameters()
     tables: list[pd.DataFrame] = []
+    slow: list[list[str]] = []
     with progress("ground-classifier", quiet) as show:
         for number, log in enumerate(logs, 1):
             columns = read_channels([log, *(others or ())], profile, dbc=dbc or (), also=CURRENT)
             tables.append(_judged(known, columns, log))
+            slow.append(known.too_slow(columns))
             show(number, len(logs), log.name)
     _write(tables, target)
     if not quiet:
-        for log, table in zip(logs, tables, strict=True):
+        for log, table, notes in zip(logs, tables, slow, strict=True):
             shares = table["ground"].value_counts(normalize=True)
             print(
                 f"{log.name}: {len(table)} windows; " + ", ".join(f"{g} {s:.0%}" for g, s in shares.items())
             )
+            for note in notes:
+                print(f"  {note}")
         print(f"Written to {output}")
 
 

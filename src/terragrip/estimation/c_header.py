@@ -23,11 +23,22 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
     """The estimator that made a file of estimates, by its origin (`Estimates.read_about`).
 
     Raises InputError, which names ``file``, where the origin is of an earlier version, or of estimates that the kernel does not make alone:
-    slip without torques, the torque of an engine or of a drive train.
+    slip without torques, the torque of an engine or of a drive train, smoothed ones; and where two names are one in capitals.
     """
     known = about.get("settings", {})
     if not {"noise", "held", "channels"} <= set(known) or "vehicle" not in about:
         raise InputError("contains no settings", file=file, hint="estimate the log again with this version")
+    if about.get("smooth"):
+        raise InputError(
+            "is smoothed, and a controller knows no later samples",
+            file=file,
+            hint="estimate the log without --smooth",
+        )
+    names = [name.upper() for name in Vehicle.from_dict(about["vehicle"]).wheels]
+    if len(set(names)) < len(names):
+        raise InputError(
+            "has wheels whose names differ in case only", file=file, hint="rename one in the vehicle file"
+        )
     if "zero_slip" in about or about.get("driveline") is not None:
         raise InputError(
             "is of slip without torques, or of the torque of a drive train: Terragrip works out more for it than its kernel does",
@@ -53,7 +64,7 @@ def c_header(estimator: TractionEstimator, origin: str) -> str:
     engine = estimator.engine
     ins = {name: place for name, place in engine.slots_in.items() if name in estimator.channels}
     lines = [
-        f"/* {origin.replace('*/', '')}",
+        f"/* {origin.replace('*', '')}",
         " * Made by `terragrip new controller`; its use: docs/controller.md. */",
         "#ifndef TERRAGRIP_SETTINGS_H",
         "#define TERRAGRIP_SETTINGS_H",

@@ -96,7 +96,7 @@ class _Column:
             return known
         try:
             self.numbers.append(value)
-        except TypeError:
+        except (TypeError, OverflowError):  # JSON has integers of any size
             self.numbers.append(np.nan)
             return False
         return True

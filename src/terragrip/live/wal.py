@@ -14,7 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from terragrip.errors import InputError
+
 MAGIC = b"TGWAL4\r\n"
+_ANY = b"TGWAL"  # of any version
 _HEAD = struct.Struct("<II")
 
 Entry = tuple[str, Any]
@@ -61,12 +64,18 @@ class WriteAhead:
 
 
 class Reading:
-    """Entries of a write-ahead file up to its first torn or damaged frame; ``good`` is where that begins, ``size`` the file's."""
+    """Entries of a write-ahead file up to its first torn or damaged frame; ``good`` is where that begins, ``size`` the file's.
+
+    Raises InputError on a file of another version, whose rows would be lost.
+    """
 
     def __init__(self, path: Path) -> None:
         self._data = path.read_bytes()
         self.size = len(self._data)
         self.good = len(MAGIC) if self._data.startswith(MAGIC) else 0
+        if len(self._data) >= len(MAGIC) and not self.good and self._data.startswith(_ANY):
+            hint = "go on with the version that wrote it until the next segment, or remove it: its rows are then lost"
+            raise InputError("is of another version of Terragrip", file=path, hint=hint)
 
     def __iter__(self) -> Iterator[Entry]:
         data, place = self._data, self.good

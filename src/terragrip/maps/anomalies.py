@@ -74,7 +74,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     score = beyond / spread / max(scale, 1.0)
     p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
     patches = [
-        _anomaly(patch, cells, place, constants, spread * max(scale, 1.0), p)
+        _anomaly(patch, cells, tree, constants, spread * max(scale, 1.0), p)
         for patch in _patches(tree, place, significant(p, share), score)
     ]
     listed = significant(np.array([one.p for one in patches]), share, int(known.sum()))
@@ -159,9 +159,7 @@ def _patches(tree: Any, place: Floats, chosen: Bools, score: Floats) -> list[Int
     return [patch for patch in np.split(order, cuts) if len(patch) >= LEAST_CELLS]
 
 
-def _anomaly(
-    patch: Ints, cells: Cells, place: Floats, constants: Floats, spread: Floats, p: Floats
-) -> Anomaly:
+def _anomaly(patch: Ints, cells: Cells, tree: Any, constants: Floats, spread: Floats, p: Floats) -> Anomaly:
     """A patch against the cells around it as a whole: those of its cells reach past the rest of a narrow strip, which is no patch."""
     from scipy.special import ndtr
 
@@ -169,23 +167,25 @@ def _anomaly(
     value, *shared = np.average(
         np.column_stack([cells.value, constants])[patch], axis=0, weights=weight
     ).tolist()
-    base = _beside(patch, cells, place, value)
+    base = _beside(patch, cells, tree, value)
     std = float(np.hypot.reduce([1 / np.sqrt(weight.sum()), *shared]))
     whole = 2 * ndtr(-abs(value - base) / np.median(spread[patch]))
-    column, row = place[patch].mean(axis=0) + 0.5
+    column, row = tree.data[patch].mean(axis=0) + 0.5
     return Anomaly(
         patch, float(column), float(row), value, base, value - base, std, float(max(p[patch].min(), whole))
     )
 
 
-def _beside(patch: Ints, cells: Cells, place: Floats, value: float) -> float:
+def _beside(patch: Ints, cells: Cells, tree: Any, value: float) -> float:
     """A patch's value clipped to the range of the medians of the cells on its sides, those that touch it left out."""
     from scipy.spatial import cKDTree
 
+    place = tree.data
     middle = place[patch].mean(axis=0)
-    offset = place - middle
-    near = np.hypot(*offset.T) < np.hypot(*offset[patch].T).max() + 2 * CORE
-    near &= cKDTree(place[patch]).query(place)[0] > SMOOTH
-    sides = [near & (sign * offset[:, axis] > 0) for axis in (0, 1) for sign in (-1, 1)]
-    medians = [float(np.median(cells.value[side])) for side in sides if side.sum() >= SIDE]
+    reach = np.hypot(*(place[patch] - middle).T).max() + 2 * CORE
+    near = np.array(tree.query_ball_point(middle, reach))
+    near = near[cKDTree(place[patch]).query(place[near])[0] > SMOOTH]
+    offset = place[near] - middle
+    sides = [near[sign * offset[:, axis] > 0] for axis in (0, 1) for sign in (-1, 1)]
+    medians = [float(np.median(cells.value[side])) for side in sides if len(side) >= SIDE]
     return float(np.clip(value, min(medians), max(medians))) if medians else value

@@ -47,8 +47,8 @@ def filled(cells: Cells, reach: float) -> Cells:
         )
     value, variance = _kriged(place, cells.value, np.median(cells.std**2 - cells.constant**2), wanted)
     none = np.zeros(len(wanted), dtype=np.int64)
-    constant = float(np.median(cells.constant))
     nearest = tree.query(wanted)[1]
+    constant = cells.constant[nearest]
     new = Cells(
         wanted[:, 0], wanted[:, 1], value, np.sqrt(variance + constant**2), cells.constants[nearest], none, none, cells.run[nearest],
         np.full(len(wanted), np.nan), cells.headland[nearest],
