@@ -37,6 +37,9 @@
 #define TG_REAL double
 #define TG_PRECISION tg_kernel_in_double_precision
 #endif
+#ifdef __cplusplus
+extern "C" {
+#endif
 extern const int TG_PRECISION;
 #ifdef __GNUC__
 static const int *const tg_precision_check __attribute__((used)) = &TG_PRECISION;
@@ -435,6 +438,9 @@ tg_status tg_estimator_settings(const tg_estimator *e, tg_settings *settings);
 /* From the next sample on, these SDs and update periods of the channels (36 each, as in tg_settings); the estimate continues. */
 tg_status tg_estimator_set_noise(tg_estimator *e, const tg_real *noise, const tg_real *held_period);
 /* cdef end */
+#ifdef __cplusplus
+}
+#endif
 
 /* ---- What a filter is made of, so that C code can hold one without allocation. Read and write it by the functions above only. ----
  * Inside, states run (mu_1..mu_n, rho_s, v, omega_1..omega_n) and covariances are factors P = U D U' by columns; see src/filter.h. */

@@ -95,6 +95,19 @@ def test_smoothed_estimates_and_names_that_are_one_in_capitals_are_refused(
     }
     with pytest.raises(tg.InputError, match="case only"):
         estimator_of({**about, "vehicle": vehicle}, "")
+    axles = {"a": about["vehicle"]["axles"]["front"], "A": about["vehicle"]["axles"]["rear"]}
+    with pytest.raises(tg.InputError, match="case only"):
+        estimator_of({**about, "vehicle": {**about["vehicle"], "axles": axles}}, "")
+
+
+def test_a_turn_by_positions_is_refused(made: tuple[Path, tg.Estimates, tg.Recording]) -> None:
+    _, estimates, recording = made
+    angle = recording.time / 8  # a circle of 8 m at 1 m/s
+    frame = recording.to_pandas().drop(columns=[n for n in recording.channels if n.startswith("angular")])
+    frame["latitude"], frame["longitude"] = 48 + 7.2e-5 * (1 - np.cos(angle)), 11 + 1.07e-4 * np.sin(angle)
+    turned = tg.estimate(tg.Recording.from_frame(frame), estimates.vehicle)
+    with pytest.raises(tg.InputError, match="rate of turn from positions"):
+        estimator_of(turned.about, "")
 
 
 def test_numbers_come_back_to_the_last_bit(made: tuple[Path, tg.Estimates, tg.Recording]) -> None:

@@ -13,7 +13,9 @@ from typing import Any
 from terragrip._kernel import ffi
 from terragrip.errors import InputError
 from terragrip.estimation.columns import column_named
+from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.settings import sample_slots
 from terragrip.vehicle import Vehicle
 
 _INDENT = "    "
@@ -23,7 +25,8 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
     """The estimator that made a file of estimates, by its origin (`Estimates.read_about`).
 
     Raises InputError, which names ``file``, where the origin is of an earlier version, or of estimates that the kernel does not make alone:
-    slip without torques, the torque of an engine or of a drive train, smoothed ones; and where two names are one in capitals.
+    slip without torques, the torque of an engine or of a drive train, a turn by positions, smoothed ones; and where two columns' names
+    are one in capitals.
     """
     known = about.get("settings", {})
     if not {"noise", "held", "channels"} <= set(known) or "vehicle" not in about:
@@ -34,19 +37,28 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
             file=file,
             hint="estimate the log without --smooth",
         )
-    names = [name.upper() for name in Vehicle.from_dict(about["vehicle"]).wheels]
-    if len(set(names)) < len(names):
-        raise InputError(
-            "has wheels whose names differ in case only", file=file, hint="rename one in the vehicle file"
-        )
+    vehicle = Vehicle.from_dict(about["vehicle"], file)
+    for slots in (sample_slots(vehicle), estimate_slots(vehicle, adaptive=True)):
+        if len({name.upper() for name in slots}) < len(slots):
+            raise InputError(
+                "has columns whose names differ in case only",
+                file=file,
+                hint="rename a wheel or an axle in the vehicle file",
+            )
     if "zero_slip" in about or about.get("driveline") is not None:
         raise InputError(
             "is of slip without torques, or of the torque of a drive train: Terragrip works out more for it than its kernel does",
             file=file,
             hint="give estimates of a log with the torques of the driven wheels",
         )
+    if about.get("turn"):
+        raise InputError(
+            "takes the rate of turn from positions, which its kernel does not read",
+            file=file,
+            hint="estimate a log with a yaw rate, or without positions",
+        )
     return TractionEstimator(
-        Vehicle.from_dict(about["vehicle"]),
+        vehicle,
         about["method"],
         sensors=known["noise"],
         held=known["held"],

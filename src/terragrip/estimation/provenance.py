@@ -44,6 +44,8 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
             "channels": sorted(estimator.channels),
         },
     }
+    if estimator.turn is not None:
+        about["turn"] = "positions"
     if estimator.slip_reference is not None:
         about["zero_slip"] = {
             wheel: {"ratio": zero.ratio, "std": zero.std, "windows": zero.windows, "doubt": zero.doubt}
