@@ -196,14 +196,19 @@ def packed(whole: bytes, packing: str) -> bytes:
     return bytes(result)
 
 
+def header_of(kinds: dict[str, Any], second: int, frame: str) -> Any:
+    """A header of ROS 1, stamped at a second."""
+    stamp = kinds["builtin_interfaces/msg/Time"](sec=1_750_000_000 + second, nanosec=0)
+    return kinds["std_msgs/msg/Header"](seq=second, stamp=stamp, frame_id=frame)
+
+
 def test_a_topic_whose_first_messages_are_empty(tmp_path: Path) -> None:
     store = get_typestore(Stores.ROS1_NOETIC)
     kinds = store.types
     with Writer(tmp_path / "log.bag") as bag:
         connection = bag.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
         for k in range(100):
-            stamp = kinds["builtin_interfaces/msg/Time"](sec=1_750_000_000 + k, nanosec=0)
-            header = kinds["std_msgs/msg/Header"](seq=k, stamp=stamp, frame_id="")
+            header = header_of(kinds, k, "")
             names = ["fl", "fr"] if k > 2 else []
             values = np.full(len(names), float(k))
             message = kinds["sensor_msgs/msg/JointState"](header, names, values, values, values)
@@ -219,10 +224,9 @@ def test_a_text_that_is_none_costs_its_message_alone(tmp_path: Path) -> None:
     with Writer(tmp_path / "log.bag") as bag:
         connection = bag.add_connection("/pull", "geometry_msgs/msg/WrenchStamped", typestore=store)
         for k in range(100):
-            stamp = kinds["builtin_interfaces/msg/Time"](sec=1_750_000_000 + k, nanosec=0)
             vector = kinds["geometry_msgs/msg/Vector3"](float(k), 0.0, 0.0)
             wrench = kinds["geometry_msgs/msg/Wrench"](vector, vector)
-            header = kinds["std_msgs/msg/Header"](seq=k, stamp=stamp, frame_id="pin")
+            header = header_of(kinds, k, "pin")
             message = kinds["geometry_msgs/msg/WrenchStamped"](header, wrench)
             raw = bytes(store.serialize_ros1(message, "geometry_msgs/msg/WrenchStamped"))
             bag.write(connection, k * 10**9, raw.replace(b"pin", b"p\x8dn") if k == 50 else raw)

@@ -37,14 +37,6 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
             file=file,
             hint="estimate the log without --smooth",
         )
-    vehicle = Vehicle.from_dict(about["vehicle"], file)
-    for slots in (sample_slots(vehicle), estimate_slots(vehicle, adaptive=True)):
-        if len({name.upper() for name in slots}) < len(slots):
-            raise InputError(
-                "has columns whose names differ in case only",
-                file=file,
-                hint="rename a wheel or an axle in the vehicle file",
-            )
     if "zero_slip" in about or about.get("driveline") is not None:
         raise InputError(
             "is of slip without torques, or of the torque of a drive train: Terragrip works out more for it than its kernel does",
@@ -57,6 +49,14 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
             file=file,
             hint="estimate a log with a yaw rate, or without positions",
         )
+    vehicle = Vehicle.from_dict(about["vehicle"], file)
+    for slots in (sample_slots(vehicle), estimate_slots(vehicle, adaptive=True)):
+        if len({name.upper() for name in slots}) < len(slots):
+            raise InputError(
+                "has columns whose names differ in case only",
+                file=file,
+                hint="rename a wheel or an axle in the vehicle file",
+            )
     return TractionEstimator(
         vehicle,
         about["method"],
