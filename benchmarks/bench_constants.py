@@ -6,7 +6,7 @@ The numbers are tg_tuned (kernel/include/terragrip.h), the bank's scales, all to
 adhesion less that with the number as it is, median and worst machine over all rates; NIS a channel of moving rows; the interval
 scores of adhesion, slip and soil resistance over those with the number as it is, geometric means. Every log loses its ground speed
 for 8 s and everything for 3 s, and half of them their pitch and accelerometer, so that each number has something to do. The numbers
-of slip from speeds alone are tried on the same logs without torques. --write puts the table into docs/families.md.
+of slip from speeds alone are tried on the same logs without torques. --write puts the table into docs/tuned-numbers.md.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench_families import DOCUMENT, Floats, driven_wheels, moving_rows, pooled_r2, result_without
+from bench_families import Floats, driven_wheels, moving_rows, pooled_r2, result_without
 from family_intervals import SCORED, intervals
 from marked import put
 from terragrip._kernel import ffi, lib
@@ -30,6 +31,7 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.simulation import SimulationResult
 from terragrip.simulation.families import draw, machines
 
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/tuned-numbers.md"
 BEGIN = "<!-- made by benchmarks/bench_constants.py --write -->"
 AT_REST = [EVENTS.index("standstill"), EVENTS.index("gap")]
 ALONE = (
@@ -61,7 +63,7 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=12)
     parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 20.0])
     parser.add_argument("--only", nargs="+", help="these numbers")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/families.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/tuned-numbers.md")
     arguments = parser.parse_args()
     drawn = [
         draw(kind, seed, rate=rate)

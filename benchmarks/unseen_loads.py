@@ -1,4 +1,4 @@
-"""What the estimates of wheels tell of loads that nothing measures, on development machines (docs/families.md).
+"""What the estimates of wheels tell of loads that nothing measures, on development machines (docs/families-history.md).
 
     python benchmarks/unseen_loads.py [--seeds 5 11 8 13] [--write]
 
@@ -10,18 +10,20 @@ explains, alone and with slips.
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench_families import DOCUMENT, driven_wheels, moving_rows
+from bench_families import driven_wheels, moving_rows
 from marked import put
 from terragrip.estimation import estimate
 from terragrip.simulation import families
 
 Floats = NDArray[np.float64]
 RATE = 100.0
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/families-history.md"
 BEGIN = "<!-- made by benchmarks/unseen_loads.py --write -->"
 HEAD = (
     "machine", "driven wheels", "µ held (%)", "load, SD", "true µ, SD", "estimated µ, SD", "true µ with load",
@@ -32,7 +34,7 @@ HEAD = (
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[5, 11, 8, 13])
-    parser.add_argument("--write", action="store_true", help="put the table into docs/families.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/families-history.md")
     arguments = parser.parse_args()
     lines = ["| " + " | ".join(HEAD) + " |", "|---|" + "---:|" * (len(HEAD) - 1)]
     kinds = {seed: kind for kind, seed in families.machines("development", max(arguments.seeds) + 1)}

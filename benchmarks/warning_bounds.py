@@ -9,7 +9,7 @@ true slip: how long before the stop the mean slip, by the truth, last passed 20 
 errs. A healthy drive under load comes near 20 %. not to be seen: stops before which the measured ground speeds, weighed by a detector that
 knows the course of the slip and the noise beforehand (a matched filter), depart from their usual by less than SURE of its SDs: at
 two looks a second, noise alone does that once in half an hour. best test: how many that filter is expected to miss, as noise also hides
-what is a little above SURE. Torques are not in that bound. --write puts the table into docs/families.md.
+what is a little above SURE. Torques are not in that bound. --write puts the table into docs/warning.md.
 """
 
 from __future__ import annotations
@@ -17,18 +17,20 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from bench_warning import DOCUMENT, SLOW, Course, course_of, judge, starts, without
+from bench_warning import SLOW, Course, course_of, judge, starts, without
 from marked import put
 from terragrip.simulation import SimulationResult, families, simulate
 from terragrip.simulation.families import Kind
 
 SURE = 3.5
 RATES = (100.0, 10.0)
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/warning.md"
 BEGIN = "<!-- made by benchmarks/warning_bounds.py --write -->"
 GROUNDS = ("development", "coarse sensors", "sharp edges", "coarse sensors, sharp edges")
 
@@ -113,7 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--stops", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0, help="of the first machine")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/families.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/warning.md")
     arguments = parser.parse_args()
     head = [
         "drives",
