@@ -9,7 +9,7 @@ drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100
 a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that
 have negative ones); one is found where its own note comes.
 
---write puts the table into docs/formats.md.
+--write puts the table into docs/checks.md.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
 BEGIN = "<!-- made by benchmarks/bench_checks.py --write -->"
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs/formats.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/checks.md"
 RATES = (None, 100.0, 20.0, 10.0)
 LIMITS = {
     "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
@@ -325,7 +325,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--machines", type=int, default=24, help="of each chassis")
     parser.add_argument("--only", nargs="+", help="these limits, as module.NAME")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/formats.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/checks.md")
     arguments = parser.parse_args()
     right, real = drives(arguments.machines), measured()
     wrong = [

@@ -7,24 +7,24 @@ from collections.abc import Iterable, Sequence
 PAGES = (
     ("is a guess from the vehicle's size", "vehicle#noise-of-the-sensors"),
     ("a vehicle's own lag is", "formats#two-sources-of-one-drive"),
-    ("or left and right wheels, may be exchanged", "formats#what-the-motion-contradicts"),
-    ("the slower one pull", "formats#what-the-motion-contradicts"),
-    ("of the axle's other wheel rises", "formats#what-the-motion-contradicts"),
-    ("Straight ahead", "formats#what-the-motion-contradicts"),
-    ("Against the direction of travel", "formats#what-the-motion-contradicts"),
-    ("by the force that these require", "formats#what-the-motion-contradicts"),
-    ("times the weight on average", "formats#what-the-motion-contradicts"),
-    ("times as far as ground_speed does", "formats#what-the-motion-contradicts"),
-    ("where the wheels are driven harder", "formats#what-the-motion-contradicts"),
-    ("the force that moves", "formats#what-the-motion-contradicts"),
-    ("where the vehicle is driven harder", "formats#what-the-motion-contradicts"),
-    ("the other wheels' torques vary with", "formats#what-the-motion-contradicts"),
-    ("the two axes may be exchanged", "formats#what-the-motion-contradicts"),
-    ("climbs that vary with roll", "formats#what-the-motion-contradicts"),
-    ("while the vehicle drives: the sensor", "formats#what-the-motion-contradicts"),
-    ("does not show which of them is wrong", "formats#what-the-motion-contradicts"),
-    ("is not the change of ground speed", "formats#what-the-motion-contradicts"),
-    ("where the accelerometer shows a climb", "formats#what-the-motion-contradicts"),
+    ("or left and right wheels, may be exchanged", "checks#signs-exchanged-channels-copies"),
+    ("the slower one pull", "checks#signs-exchanged-channels-copies"),
+    ("of the axle's other wheel rises", "checks#signs-exchanged-channels-copies"),
+    ("Straight ahead", "checks#units-scales-and-zeros"),
+    ("Against the direction of travel", "checks#signs-exchanged-channels-copies"),
+    ("by the force that these require", "checks#units-scales-and-zeros"),
+    ("times the weight on average", "checks#units-scales-and-zeros"),
+    ("times as far as ground_speed does", "checks#units-scales-and-zeros"),
+    ("where the wheels are driven harder", "checks#signs-exchanged-channels-copies"),
+    ("the force that moves", "checks#units-scales-and-zeros"),
+    ("where the vehicle is driven harder", "checks#signs-exchanged-channels-copies"),
+    ("the other wheels' torques vary with", "checks#signs-exchanged-channels-copies"),
+    ("the two axes may be exchanged", "checks#signs-exchanged-channels-copies"),
+    ("climbs that vary with roll", "checks#signs-exchanged-channels-copies"),
+    ("while the vehicle drives: the sensor", "checks#channels-that-are-dead-held-or-cut"),
+    ("does not show which of them is wrong", "checks#a-part-of-the-drive"),
+    ("is not the change of ground speed", "checks#units-scales-and-zeros"),
+    ("where the accelerometer shows a climb", "checks#units-scales-and-zeros"),
     ("may be in km/h", "formats#in-a-profile"),
     ("converted from km/h", "formats#in-a-profile"),
     ("times the ground speed", "formats#in-a-profile"),
@@ -36,30 +36,30 @@ PAGES = (
     ("time may not be in seconds", "formats#in-a-profile"),
     ("written as hhmmss", "formats#dates"),
     ("angular_velocity_z turns with", "formats#in-a-profile"),
-    ("the sensor is dead", "formats#what-the-motion-contradicts"),
-    ("while other ", "formats#what-the-motion-contradicts"),
-    ("the wheel is locked, or its sensor", "formats#what-the-motion-contradicts"),
-    ("the wheels are locked, or their sensors", "formats#what-the-motion-contradicts"),
-    ("all wheels turn: the vehicle is stuck, or its sensor", "formats#what-the-motion-contradicts"),
-    ("the vehicle pulls or climbs: no drive", "formats#what-the-motion-contradicts"),
-    ("the wheels drive on as hard as before", "formats#what-the-motion-contradicts"),
-    ("neither the motion nor another force answers", "formats#what-the-motion-contradicts"),
-    (": its scale changed, and", "formats#what-the-motion-contradicts"),
-    ("in all rows, which no cell reads", "formats#what-the-motion-contradicts"),
-    ("the zero of drawbar_force drifts", "formats#what-the-motion-contradicts"),
+    ("the sensor is dead", "checks#channels-that-are-dead-held-or-cut"),
+    ("while other ", "checks#channels-that-are-dead-held-or-cut"),
+    ("the wheel is locked, or its sensor", "checks#channels-that-are-dead-held-or-cut"),
+    ("the wheels are locked, or their sensors", "checks#channels-that-are-dead-held-or-cut"),
+    ("all wheels turn: the vehicle is stuck, or its sensor", "checks#channels-that-are-dead-held-or-cut"),
+    ("the vehicle pulls or climbs: no drive", "checks#channels-that-are-dead-held-or-cut"),
+    ("the wheels drive on as hard as before", "checks#channels-that-are-dead-held-or-cut"),
+    ("neither the motion nor another force answers", "checks#a-part-of-the-drive"),
+    (": its scale changed, and", "checks#a-part-of-the-drive"),
+    ("in all rows, which no cell reads", "checks#channels-that-are-dead-held-or-cut"),
+    ("the zero of drawbar_force drifts", "checks#a-part-of-the-drive"),
     ("is by its name the torque of an axle", "vehicle#signals-that-are-missing"),
-    ("pull, which no wheel that pulls does:", "formats#what-the-motion-contradicts"),
-    ("its sign is wrong there, ", "formats#what-the-motion-contradicts"),
-    ("while all other torques are not", "formats#what-the-motion-contradicts"),
-    ("the logger hung, it seems", "formats#what-the-motion-contradicts"),
-    ("while it keeps one value", "formats#what-the-motion-contradicts"),
+    ("pull, which no wheel that pulls does:", "checks#a-part-of-the-drive"),
+    ("its sign is wrong there, ", "checks#a-part-of-the-drive"),
+    ("while all other torques are not", "checks#channels-that-are-dead-held-or-cut"),
+    ("the logger hung, it seems", "checks#channels-that-are-dead-held-or-cut"),
+    ("while it keeps one value", "checks#channels-that-are-dead-held-or-cut"),
     ("a code for ", "formats#in-a-profile"),
-    ("more than any ground allows", "formats#what-the-motion-contradicts"),
+    ("more than any ground allows", "checks#times"),
     ("where ground and wheels drove", "formats#in-a-profile"),
-    ("Give a speed over ground: from", "formats#what-the-motion-contradicts"),
-    ("what the drawbar force does", "formats#what-the-motion-contradicts"),
-    ("in reverse turns", "formats#what-the-motion-contradicts"),
-    ("its sensor is dead", "formats#what-the-motion-contradicts"),
+    ("Give a speed over ground: from", "checks#signs-exchanged-channels-copies"),
+    ("what the drawbar force does", "checks#units-scales-and-zeros"),
+    ("in reverse turns", "checks#signs-exchanged-channels-copies"),
+    ("its sensor is dead", "checks#channels-that-are-dead-held-or-cut"),
     ("Columns that are not used", "formats#in-a-profile"),
     ("the vehicle is assumed to tow nothing", "vehicle#signals-that-are-missing"),
     ("No drive torque was found", "vehicle#signals-that-are-missing"),
@@ -97,7 +97,7 @@ PAGES = (
 )
 """Words of a note, and page#heading as in ``InputError(page=...)``."""
 
-_CONTRADICTED = ("formats#what-the-motion-contradicts", "formats#in-a-profile")
+_CONTRADICTED = ("checks#", "formats#in-a-profile")
 _NO_FAULT = "Columns that are not used"
 _SHOWN = 5  # runs
 
@@ -114,9 +114,11 @@ def doubts_of(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     found = [
         f"{name}: {note}"
         for name, notes in runs
-        for note in [one for one in notes if _page(one) in _CONTRADICTED and not one.startswith(_NO_FAULT)][
-            :1
-        ]
+        for note in [
+            one
+            for one in notes
+            if (_page(one) or "").startswith(_CONTRADICTED) and not one.startswith(_NO_FAULT)
+        ][:1]
     ]
     more = len(found) - _SHOWN
     words = f"{more} more run{'s have' if more > 1 else ' has'} such notes; 'terragrip report' shows them."
