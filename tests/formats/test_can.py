@@ -108,6 +108,34 @@ def test_bits_agree_with_cantools(data: bytes) -> None:
         assert np.isnan(result[name])
 
 
+def test_signals_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    head = 'VERSION ""\nBS_:\nBU_: E\n'
+    pages = 'BO_ 256 Drive: 8 E\n SG_ Page M : 0|8@1+ (1,0) [0|3] "" X\n' + "".join(
+        f' SG_ Speed m{page} : 8|16@1+ (0.01,0) [0|600] "rpm" X\n' for page in (0, 1)
+    )
+    both = "".join(
+        f'BO_ {key} Drive: 8 E\n SG_ Speed : 8|16@1+ (0.01,0) [0|600] "rpm" X\n' for key in (256, 257)
+    )
+    rows = [
+        (
+            0.1 * k,
+            256 + key,
+            bytes([k % 2]) + (1000 + 500 * key + 100 * (k % 2)).to_bytes(2, "little") + bytes(5),
+        )
+        for k in range(4)
+        for key in (0, 1)
+    ]
+    for text, expected in (
+        (pages, {"Speed.m0": [10, np.nan] * 2, "Speed.m1": [np.nan, 11] * 2}),
+        (both, {"Drive(100).Speed": [10, 11] * 2, "Drive(101).Speed": [15, 16] * 2}),
+    ):
+        file = tmp_path / "bus.dbc"
+        file.write_text(head + text)
+        result = decoded(rows, (file,))
+        for name, values in expected.items():
+            np.testing.assert_allclose(result[name], values, err_msg=name)
+
+
 def test_a_short_frame_lacks_what_it_does_not_reach(dbc: Path) -> None:
     result = decoded([(0.0, 291, bytes(3)), (1.0, 291, bytes(8))], (dbc,))
     assert np.isnan(result["page"][0])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -44,21 +45,23 @@ def source_of(identifier: int) -> int:
 class Catalog:
     """Messages by identifier and by parameter group; the first of equals counts.
 
-    `name` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name.
-    ``given``: the messages that came from DBC files.
+    `name` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name, or
+    ``Message(1F0).Signal`` by the identifier where these have one name, too. ``given``: names of the messages that came from DBC files.
     """
 
     def __init__(self, messages: Iterable[Message], given: Iterable[Message] = ()) -> None:
-        self.given = frozenset(message.name for message in given)
         self.by_identifier: dict[int, Message] = {}
         self.by_group: dict[int, Message] = {}
         for message in messages:
             (self.by_group if message.by_group else self.by_identifier).setdefault(message.key, message)
-        seen: dict[str, int] = {}
-        for message in self.messages:
-            for field in message.fields:
-                seen[field.name] = seen.get(field.name, 0) + 1
-        self._twice = {name for name, count in seen.items() if count > 1}
+        names = Counter(message.name for message in self.messages)
+        for table in (self.by_identifier, self.by_group):
+            for key, message in table.items():
+                if names[message.name] > 1:
+                    table[key] = replace(message, name=f"{message.name}({key & ~EXTENDED:X})")
+        own = {(message.by_group, message.key) for message in given}
+        self.given = frozenset(m.name for m in self.messages if (m.by_group, m.key) in own)
+        self._seen = Counter(field.name for message in self.messages for field in message.fields)
 
     @property
     def messages(self) -> tuple[Message, ...]:
@@ -74,7 +77,7 @@ class Catalog:
 
     def name(self, message: Message, field: Field) -> str:
         """The name of a signal in a log."""
-        return f"{message.name}.{field.name}" if field.name in self._twice else field.name
+        return field.name if self._seen[field.name] == 1 else f"{message.name}.{field.name}"
 
 
 def catalog(databases: Sequence[str | os.PathLike[str]] = ()) -> Catalog:
@@ -134,8 +137,22 @@ def message_of(database: Any, message: Any) -> Message:
     by_group = message.is_extended_frame and _is_j1939(database, message)
     extended = EXTENDED if message.is_extended_frame else 0
     key = group_of(message.frame_id) if by_group else message.frame_id | extended
-    fields = tuple(_field(signal, codes=by_group) for signal in message.signals)
-    return Message(message.name, key, fields, message.length, by_group)
+    fields = [_field(signal, codes=by_group) for signal in message.signals]
+    return Message(message.name, key, _told_apart(fields), message.length, by_group)
+
+
+def _told_apart(fields: Sequence[Field]) -> tuple[Field, ...]:
+    """Fields that share a name, as a multiplexer's pages do, get that of the page (``Speed.m1``), or of their place (``Speed.bit16``)."""
+    names = Counter(field.name for field in fields)
+    pages = Counter((field.name, page) for field in fields for page in field.chosen)
+
+    def name(field: Field) -> str:
+        if names[field.name] == 1:
+            return field.name
+        alone = field.chosen and all(pages[field.name, page] == 1 for page in field.chosen)
+        return f"{field.name}.{f'm{min(field.chosen)}' if alone else f'bit{field.start}'}"
+
+    return tuple(replace(field, name=name(field)) for field in fields)
 
 
 def _is_j1939(database: Any, message: Any) -> bool:
