@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats
 from terragrip.maps.columns import Columns
+from terragrip.maps.slopes import without_slope
 from terragrip.maps.values import Reading
 
 Ints = npt.NDArray[np.int64]
@@ -35,8 +36,8 @@ class Pieces(Columns):
     """Consecutive rows of one reading in one part of a cell, as arrays (m,).
 
     ``column``, ``row``: the cell; ``run``: number of the run; ``time`` [s] of the first row; ``metres`` driven; ``x``, ``y``, their
-    constants (m, K) and SDs summed over the metres; ``rows``: their number; ``headland``: whether the first row is on a headland. The
-    signs of x, y and constants are reversed for braked wheels.
+    constants (m, K), errors by a slope (m, 2) and SDs summed over the metres; ``rows``: their number; ``headland``: whether the first
+    row is on a headland. The signs of x, y and constants are reversed for braked wheels.
     """
 
     column: Ints
@@ -107,17 +108,18 @@ def pieces_of(reading: Reading, time: Floats, way: Floats, size: float, run: int
 def cells_of(parts: Sequence[Pieces], correlated: float) -> tuple[Cells, Cells]:
     """The cells of one quantity, and the same by pass. `correlated` [m]: `CORRELATED` wheel radii.
 
-    A cell's value is Σ y/Σ x: random errors of x average out and do not reduce it, as they would in least squares. Its variance is
-    the larger of two, plus that of the constants, which no number of passes reduces. The first is the scatter of the pieces
-    (K Σ metres/(Σ x)², K pooled over the map: variation of the ground within a cell, and random errors over a piece). The second is
-    the estimator's own random variance, once for every `correlated` metres of wheel travel. Errors that rows nearby share are added whole,
-    whatever the passes: all may lie on one side of a hill.
+    A cell's value is Σ y/Σ x: random errors of x average out and do not reduce it, as they would in least squares. Its variance is the
+    larger of two, plus that of the constants, which no number of passes reduces. The first is the scatter of the pieces (K Σ
+    metres/(Σ x)², K pooled over the map: variation of the ground within a cell, and random errors over a piece). The second is the
+    estimator's own random variance, once for every `correlated` metres of wheel travel. A slope that nothing measures is taken out as
+    far as lanes both ways show it; what is left is added whole: all passes may lie on one side of a hill.
     """
     joined = Pieces.joined(parts)
     joined = joined.where(np.lexsort((joined.time, joined.run, joined.row, joined.column)))
     new_cell = _starts(joined.column, joined.row)
     new_pass = new_cell | _starts(joined.run) | (np.diff(joined.time, prepend=-np.inf) > PASS_TIME)
     cell = np.cumsum(new_cell) - 1
+    joined = without_slope(joined, cell, np.cumsum(new_pass) - 1)
     scatter = _scatter(joined, cell)
     passes = np.bincount(cell, new_pass).astype(np.int64) if len(cell) else np.zeros(0, dtype=np.int64)
     whole = _summed(joined, new_cell, scatter, correlated, passes)
@@ -166,7 +168,7 @@ def _summed(pieces: Pieces, start: Bools, scatter: float, correlated: float, pas
     random = np.hypot(total(pieces.random) / safe, value * x_share)
     constants = (total(pieces.constants).T - value * total(pieces.x_constants).T) / safe
     once = np.minimum(1.0, correlated / np.maximum(metres, 1e-9))
-    local = total(pieces.local) / safe
+    local = np.linalg.norm(total(pieces.local), axis=1) / safe
     std = np.sqrt(
         np.maximum(scatter * metres / safe**2, random**2 * once) + local**2 + np.sum(constants**2, axis=0)
     )

@@ -51,9 +51,9 @@ class Reading:
     """One quantity read at one place of the vehicle, row by row (n,).
 
     ``east``, ``north`` [m]; ``x``, ``y`` as in the module's docstring; ``constants``, ``x_constants`` (n, K): by how much each of K
-    constants that all rows share changes them, with sign, if it is off by one SD; ``local``: SD of y's error that rows nearby share;
-    ``random``, ``x_random``: SDs of the rest, as the estimator states them; ``good``: rows that count; ``turns``: x and y change sign
-    together where a wheel brakes.
+    constants that all rows share changes them, with sign, if it is off by one SD; ``local`` (n, 2): by how much one SD of a slope up
+    to the east, and up to the north, changes y where nothing measures it; ``random``, ``x_random``: SDs of the rest, as the estimator
+    states them; ``good``: rows that count; ``turns``: x and y change sign together where a wheel brakes.
     """
 
     quantity: str
@@ -120,8 +120,9 @@ def readings_of(
     if estimates.has_adhesion and "soil_resistance" in estimates.columns:
         rho, std = estimates["soil_resistance"], estimates["soil_resistance_std"]
         centre = places.of(float(np.mean(vehicle.axle_to_rear[vehicle.wheel_axle])), 0.0)
-        constants, local = _resistance_constants(vehicle, estimates)
-        yield _reading("soil_resistance", centre, rho, constants, std, counted, local=local)
+        constants, unmeasured = _resistance_constants(vehicle, estimates)
+        uphill = unmeasured, places.heading
+        yield _reading("soil_resistance", centre, rho, constants, std, counted, slope=uphill)
 
 
 def _driven(estimates: Estimates, vehicle: Vehicle) -> Iterator[tuple[int, str, float, float]]:
@@ -144,9 +145,10 @@ def _reading(
     std: Floats,
     counted: Bools,
     x: tuple[Floats, Floats, Floats] | None = None,
-    local: float = 0.0,
+    slope: tuple[float, Floats] | None = None,
 ) -> Reading:
-    """`std` is y's whole SD; the constant and local parts, no more than it, are subtracted. `x`: value, constants, random SD."""
+    """`std` is y's whole SD; the constant and local parts, no more than it, are subtracted. `x`: value, constants, random SD. `slope`:
+    SD of one that nothing measures, and the heading (n,)."""
     turns = x is not None
     if x is None:
         x = np.ones(len(y)), np.zeros_like(constants), np.zeros(len(y))
@@ -154,10 +156,12 @@ def _reading(
     constant = np.minimum(together, std)
     constants = constants * np.divide(constant, together, out=np.zeros(len(y)), where=together > 0)[:, None]
     rest = np.sqrt(np.maximum(std**2 - constant**2, 0.0))
-    near = np.minimum(local, rest)
+    sd, heading = slope or (0.0, np.zeros(len(y)))
+    near = np.minimum(sd, rest)
+    local = near[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
     random = np.sqrt(rest**2 - near**2)
     good = counted & np.isfinite(place[0]) & np.isfinite(x[0]) & np.isfinite(y) & (std < WIDEST_STD)
-    return Reading(quantity, *place, x[0], y, constants, x[1], near, random, x[2], good, turns)
+    return Reading(quantity, *place, x[0], y, constants, x[1], local, random, x[2], good, turns)
 
 
 def _adhesion_constants(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
@@ -175,7 +179,7 @@ def _adhesion_constants(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
 
 def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Floats, float]:
     """What one SD of the same constants changes in rho_s = mean mu - (drawbar + m a)/(m g) - slope (n, 2): shares of the thrust, and
-    zeros; and the SD of a slope which nothing measures: the same over a hill's length, and of the other sign on the way back."""
+    zeros; and the SD of a slope which nothing measures, all that the estimates leave open where the vehicle file does not state it."""
     known, driven = vehicle.uncertainty, max(int(np.sum(vehicle.driven)), 1)
     mean = np.mean([estimates[f"adhesion_{wheel}"] for wheel in estimates.wheels], axis=0)
     weight = vehicle.mass * STANDARD_GRAVITY
@@ -187,16 +191,16 @@ def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Float
         (known.drive_torque_offset or 0.0) * np.sqrt(driven) / (float(vehicle.wheel_radius.mean()) * weight)
     )
     force = (known.drawbar_offset or 0.0) / weight
-    slope, local = known.slope or 0.0, 0.0
+    slope, unmeasured = known.slope or 0.0, 0.0
     channels = estimates.about.get("settings", {}).get("channels", ("acceleration_x",))
     if (
         "acceleration_x" in channels and known.acceleration_bias is not None
     ):  # it measures slope and acceleration together
         slope = min(slope or np.inf, known.acceleration_bias / STANDARD_GRAVITY)
     elif "pitch" not in channels:
-        slope, local = 0.0, slope
+        slope, unmeasured = 0.0, slope or np.inf
     zeros = float(np.hypot.reduce([offset, force, slope]))
-    return np.column_stack([share * mean, np.full(len(mean), zeros)]), local
+    return np.column_stack([share * mean, np.full(len(mean), zeros)]), unmeasured
 
 
 def _form(
