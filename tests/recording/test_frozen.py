@@ -77,6 +77,17 @@ def test_a_torque_at_its_limit_and_an_axle_that_is_off_are_left_alone() -> None:
     assert frozen_warnings(pulling(**off)) == []
 
 
+def test_steps_of_a_speed_are_not_its_repetition_where_its_lag_was_corrected() -> None:
+    """.1 km/h of a receiver of 5 Hz: between two samples its resolution does not show, and a cruise was called not measured."""
+    time = np.arange(0, 300, 0.2)
+    speed = (3.5 + 1.5 * np.sign(np.sin(time / 12)) * np.abs(np.sin(time / 12)) ** 0.01) / 3.6
+    speed += 0.011 * np.random.default_rng(7).standard_normal(len(time))
+    steps = np.round(3.6 * speed, 1) / 3.6
+    wheels = {"wheel_speed_l": speed / 0.4}
+    for ground in (steps, np.interp(time + 0.0813, time, steps)):
+        assert frozen_warnings(Recording(time, {"ground_speed": ground, **wheels})) == []
+
+
 def test_a_logger_that_hung_is_named_and_a_gap_is_no_repetition() -> None:
     drive = pulling()
     rows = (TIME >= 20) & (TIME <= 30)

@@ -294,6 +294,14 @@ def test_angles_and_gravity_are_doubted_by_their_size(channel: str, value: float
     assert said(ground_speed=SPEED, **{channel: np.full(N, np.nan)}) == ""
 
 
+def test_a_mass_of_the_load_alone_is_doubted(vehicle: Vehicle) -> None:
+    """A tank of 3 t of a sprayer of 11.5 t gave four times the adhesion, and half of the rows as outliers, without a word."""
+    assert said(vehicle, mass=np.linspace(20.0, 65.0, N)).startswith(
+        "mass reads up to 62.75 kg, under half of"
+    )
+    assert said(vehicle, mass=np.linspace(80.0, 139.0, N)) == ""
+
+
 @pytest.mark.parametrize(
     ("step", "rows", "words"),
     [

@@ -1,4 +1,4 @@
-"""A ground speed that is not 0 where the wheels stand."""
+"""A ground speed, or torques, that are not 0 where the wheels stand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import pytest
 
 from steady_drive import TIME, log
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.rest import rest_warnings
+from terragrip.recording.rest import rest_warnings, torque_rest_warnings
+from terragrip.vehicle import Vehicle
 
 STOPS = (np.abs(TIME - 60) < 8) | (np.abs(TIME - 140) < 6)
 
@@ -55,3 +56,32 @@ def test_the_usual_speed_is_that_of_driving_however_long_the_vehicle_stands() ->
     log = Recording(TIME, {"ground_speed": ground, "wheel_speed_l": rim / 0.4, "wheel_speed_r": rim / 0.4})
     (note,) = rest_warnings(log)
     assert float(note.split("at usual speed by ")[1].split(",")[0]) == pytest.approx(0.1 / 1.6, rel=0.02)
+
+
+CART = Vehicle.from_dict(
+    {
+        "name": "cart",
+        "mass": 200,
+        "axles": {"a": {"mass": 200, "wheels": ["l", "r"]}},
+        "wheel": {"radius": 0.4, "inertia": 1},
+        "uncertainty": {"drive_torque_offset": 2.0},
+    }
+)
+
+
+def test_torques_that_read_the_same_in_every_stop_are_named() -> None:
+    """One pressure of a hydraulic motor in place of the difference of two: soil resistance read .074 for .042, without a word."""
+    standing = stopping().channels["wheel_speed_l"] < 0.1
+
+    def with_torque(at_rest: np.ndarray | float, **more: np.ndarray) -> list[str]:
+        torque = np.where(standing, 0.0, 60.0) + at_rest + np.random.default_rng(6).standard_normal(len(TIME))
+        torques = {"drive_torque_l": torque, "drive_torque_r": torque + 1}
+        return torque_rest_warnings(Recording(TIME, {**stopping().channels, **torques, **more}), CART)
+
+    (note,) = with_torque(40.0)
+    assert note.startswith(
+        "The drive torques read the same in 3 stops of all wheels (l 40, r 41 N m), 0.1 of the weight"
+    )
+    assert with_torque(1.0) == []
+    assert with_torque(np.where(TIME < 80, 40.0, 30.0)) == []  # motors that hold it on two slopes
+    assert with_torque(40.0, pitch=np.full(len(TIME), 0.1)) == []  # or on one, as measured

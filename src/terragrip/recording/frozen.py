@@ -200,7 +200,10 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
     if rows.sum() < _OFTEN or not _is_restless(time, values):
         return []
-    if quantum(what) >= _RESOLVED * (white_noise(when, what) or 0.0):
+    step = max(
+        quantum(what), quantum(what[first[rows]])
+    )  # a lag that was corrected leaves it in the kept values alone
+    if step >= _RESOLVED * (white_noise(when, what) or 0.0):
         return []
     k = int(np.argmax(rows))
     return [

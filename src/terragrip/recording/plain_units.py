@@ -1,4 +1,4 @@
-"""Angles, gravity and time that are likely not in SI, each by itself: sentences for the user, never errors."""
+"""Angles, gravity, mass and time that are likely not in SI, each by itself: sentences for the user, never errors."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from terragrip.recording.ranks import median, quantile
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
 
-
+_EMPTY = 0.5  # of the vehicle file's mass: few machines are so much lighter without their load
 _ENOUGH = 4000  # rows that show how far rows are apart
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 
@@ -42,6 +43,17 @@ def gravity_warnings(recording: Recording) -> list[str]:
     if rest < -8:
         return ["acceleration_z rests at -g: the axes point the other way (z up, specific force)."]
     return []
+
+
+def mass_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
+    """A mass that never comes near the vehicle file's: that of the load alone, as a tank's level gives it."""
+    size = _typical_size(recording, "mass")
+    if vehicle is None or size is None or size > _EMPTY * vehicle.mass:
+        return []
+    return [
+        f"mass reads up to {size:.4g} kg, under half of the vehicle file's {vehicle.mass:.4g} kg: if it is of the load alone, add the "
+        "empty machine by 'offset:' in the profile; else correct the vehicle file."
+    ]
 
 
 def spacing_warnings(recording: Recording) -> list[str]:

@@ -24,11 +24,11 @@ from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings, thrusts_of
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
-from terragrip.recording.plain_units import angle_warnings, gravity_warnings, spacing_warnings
+from terragrip.recording.plain_units import angle_warnings, gravity_warnings, mass_warnings, spacing_warnings
 from terragrip.recording.position_speed import position_warnings
 from terragrip.recording.replays import replay_warnings
 from terragrip.recording.rescaled import rescaled_warnings
-from terragrip.recording.rest import rest_warnings
+from terragrip.recording.rest import rest_warnings, torque_rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
@@ -206,6 +206,8 @@ _EACH = (
     Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
     Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
+    Check("torques at rest", lambda log: torque_rest_warnings(log.rows, log.vehicle), (*_WAY, "frozen")),
+    Check("mass", lambda log: mass_warnings(log.rows, log.any_vehicle), needs_wheels=False),
     Check("codes", lambda log: log.codes, needs_wheels=False),
     Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
     Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),

@@ -1,4 +1,4 @@
-"""A ground speed that is not 0 where the vehicle stands: sentences for the user, never errors."""
+"""A ground speed, or torques, that are not 0 where the vehicle stands: sentences for the user, never errors."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.arrays import Bools, Floats
+from terragrip.physics.loads import GRAVITY
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import LONG, gaps
@@ -14,6 +16,7 @@ from terragrip.recording.turns import filled
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
 
 _STILL = 0.01  # of a rim's speed that a twentieth of the drive exceeds
 _ROLLING_OUT = 1.0  # s after the wheels stop, and before they start
@@ -21,42 +24,100 @@ _FEWEST = 4  # values of a stop
 _SHIFT = 0.03  # of the usual speed, which slip is off by
 _SURE = 4.0  # standard deviations at rest: noise without a sign has a mean of 1.9 of its own (Rayleigh)
 _ALIKE = 0.5  # of the shift, by which stops differ
+_HELD = 0.1  # of a torque, likewise: motors that hold a vehicle do so on one slope and another
+_THRUST = 0.01  # of the weight
+_SLOPE = 0.3  # of a thrust, that a measured slope explains
 
 
 def rest_warnings(recording: Recording) -> list[str]:
     """A sentence where the ground speed reads much the same value, not 0, whenever all wheels stand for long."""
-    ground, rims = recording.channels.get("ground_speed"), rim_names(recording.channels)
-    if ground is None or not rims or not np.isfinite(ground).any() or np.any(np.diff(recording.time) <= 0):
+    ground = recording.channels.get("ground_speed")
+    if ground is None or not np.isfinite(ground).any():
         return []
+    rows, still = _stops(recording)
+    read = [values for stop in rows if len(values := _known(ground[stop])) >= _FEWEST]
+    if not read:
+        return []
+    means, scatter = (
+        np.array([np.mean(values) for values in read]),
+        [float(np.std(values)) for values in read],
+    )
+    shift = median(means)
+    driven = np.abs(ground[~still & np.isfinite(ground)])
+    usual = quantile(driven, 0.95) if len(driven) else 0.0
+    if not usual > 0 or not abs(shift) > max(_SHIFT * usual, _SURE * median(np.array(scatter))):
+        return []
+    if quantile(np.abs(means - shift), 0.75) > _ALIKE * abs(shift):
+        return []
+    return [
+        f"ground_speed reads {shift:.2g} m/s in {len(read)} stop{'s' if len(read) > 1 else ''} of all wheels: its zero is off, and slip "
+        f"at usual speed by {abs(shift) / usual:.2g}, unless the vehicle slid. Write 'offset:' for it in the profile."
+    ]
+
+
+def torque_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where the drive torques read one and the same thrust, not 0, in two long stops of all wheels or more.
+
+    A motor that holds the vehicle reads as much as the slope asks for, which differs from stop to stop.
+    """
+    torques = {w: recording.channels.get(f"drive_torque_{w}") for w in vehicle.wheels}
+    read = {
+        w: values - vehicle.drive_torque_offset[i]
+        for i, w in enumerate(torques)
+        if (values := torques[w]) is not None
+    }
+    pitch = recording.channels.get("pitch", np.zeros(len(recording)))
+    stops = [
+        ({w: float(np.mean(_known(values[stop]))) for w, values in read.items()}, _known(pitch[stop]))
+        for stop in _stops(recording)[0]
+        if read and all(len(_known(values[stop])) >= _FEWEST for values in read.values())
+    ]
+    if len(stops) < 2:
+        return []
+    weight, radius = GRAVITY * vehicle.mass, dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
+    thrusts = np.array([sum(mean / radius[w] for w, mean in stop.items()) for stop, _ in stops]) / weight
+    usual = median(thrusts)
+    off = (
+        len(read)
+        * (vehicle.uncertainty.drive_torque_offset or 0.0)
+        / median(np.array(vehicle.wheel_radius))
+        / weight
+    )
+    explained = [bool(len(tilt)) and np.sin(np.mean(tilt)) / usual > _SLOPE for _, tilt in stops]
+    if (
+        not abs(usual) > max(_THRUST, _SURE * off)
+        or np.max(np.abs(thrusts - usual)) > _HELD * abs(usual)
+        or any(explained)
+    ):
+        return []
+    shown = ", ".join(f"{w} {median(np.array([stop[w] for stop, _ in stops])):.3g}" for w in read)
+    return [
+        f"The drive torques read the same in {len(stops)} stops of all wheels ({shown} N m), {abs(usual):.2g} of the weight over the "
+        "radius: their zeros are off, and adhesion by as much, unless brakes hold against the drive. Of a hydraulic motor the difference "
+        "of its two pressures counts; else write 'offset:' for each in the profile."
+    ]
+
+
+def _known(values: Floats) -> Floats:
+    return values[np.isfinite(values)]
+
+
+def _stops(recording: Recording) -> tuple[list[slice], Bools]:
+    """The rows of each long stop of all wheels, without those in which they stop and start, and whether they stand (n,)."""
     time, still = recording.time, np.ones(len(recording), dtype=bool)
+    rims = rim_names(recording.channels)
+    if not rims or np.any(np.diff(time) <= 0):
+        return [], still
     for name in rims:
-        turning = np.abs(filled(recording.time, recording.channels[name]))
-        if not np.isfinite(turning).all():
-            return []
-        usual = quantile(turning, 0.95)
+        turning = np.abs(filled(time, recording.channels[name]))
+        usual = quantile(turning, 0.95) if np.isfinite(turning).all() else 0.0
         if not usual > 0:  # dead, or it hardly ever turns: it shows no stop
-            return []
+            return [], still
         still &= turning <= _STILL * usual
     cut = np.flatnonzero(np.r_[True, (still[1:] != still[:-1]) | gaps(time), True])
     stops = []
     for first, after in pairwise(cut.tolist()):
         start, end = time[first] + _ROLLING_OUT, time[after - 1] - _ROLLING_OUT
         if still[first] and end - start >= LONG - 2 * _ROLLING_OUT:
-            rows = slice(*np.searchsorted(time, [start, end]))
-            values = ground[rows][np.isfinite(ground[rows])]
-            if len(values) >= _FEWEST:
-                stops.append((float(np.mean(values)), float(np.std(values))))
-    if not stops:
-        return []
-    means, scatter = np.array(stops).T
-    shift = median(means)
-    driven = np.abs(ground[~still & np.isfinite(ground)])
-    usual = quantile(driven, 0.95) if len(driven) else 0.0
-    if not usual > 0 or not abs(shift) > max(_SHIFT * usual, _SURE * median(scatter)):
-        return []
-    if quantile(np.abs(means - shift), 0.75) > _ALIKE * abs(shift):
-        return []
-    return [
-        f"ground_speed reads {shift:.2g} m/s in {len(stops)} stop{'s' if len(stops) > 1 else ''} of all wheels: its zero is off, and slip "
-        f"at usual speed by {abs(shift) / usual:.2g}, unless the vehicle slid. Write 'offset:' for it in the profile."
-    ]
+            stops.append(slice(*np.searchsorted(time, [start, end])))
+    return stops, still

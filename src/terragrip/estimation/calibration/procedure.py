@@ -48,7 +48,8 @@ def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
         if len(known) and np.quantile(np.abs(known - usual), 0.9) > _OTHER_LOAD * weight:
             unit = "kg" if name == "mass" else "N"
             raise InputError(
-                f"calibrate needs the load of the vehicle file, {usual:.4g} {unit}; here it is {np.min(known):.4g} to {np.max(known):.4g}",
+                f"calibrate needs the load of the vehicle file, {usual:.4g} {unit} to within {_OTHER_LOAD * weight:.3g} (2 % of the "
+                f"weight, to which torque gains are relative); here it is {np.min(known):.4g} to {np.max(known):.4g}",
                 file=log.source,
                 place=f"column {name}",
                 hint="drive with the tank contents of the vehicle file and no tool on the hitch, or give a vehicle file for this load",
