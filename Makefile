@@ -218,7 +218,7 @@ system-fuzz:
 	  echo "Installing $(FUZZ_CC) for the kernel's fuzzers"; \
 	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends clang libclang-rt-dev; } >/dev/null 2>&1 || true; fi
 
-FUZZ_FLAGS := -std=c99 -O1 $(SANITIZERS) -fsanitize=fuzzer-no-link -Wall -Wextra -Wno-psabi -Wno-bitwise-instead-of-logical -Werror \
+FUZZ_FLAGS := -std=c99 -O1 $(SANITIZERS) -fsanitize=fuzzer-no-link -Wall -Wextra -Wno-psabi -Werror \
 	-Ikernel/include -Ikernel/src -Ikernel/tests
 build/fuzz/objects/%.o: kernel/src/%.c $(KERNEL_HEADERS) Makefile
 	@mkdir -p $(@D)
@@ -260,4 +260,4 @@ kernel-others: $(VENV)/made ## compile the package's C for macOS and Windows (do
 	@$(PIP) install --quiet --target build/ziglang --upgrade ziglang
 	@for target in $(OTHERS); do for source in $(KERNEL_SOURCES) kernel/python/cpu.c src/terragrip/simulation/plant.c; do \
 	  PYTHONPATH=build/ziglang $(BIN)/python -m ziglang cc -target $$target -std=c99 -O2 -fno-math-errno -fno-trapping-math -ffp-contract=off -Wall -Wextra -Werror \
-	    -Wno-bitwise-instead-of-logical -Ikernel/include -Ikernel/src -c -o build/others.o $$source || exit 1; done; echo "$$target: compiles"; done
+	    -Ikernel/include -Ikernel/src -c -o build/others.o $$source || exit 1; done; echo "$$target: compiles"; done

@@ -17,9 +17,9 @@ TG_INLINE int pair(int i, int j) { return i > j ? i * (i + 1) / 2 + j : j * (j +
 /* Row a of the map's block from parameters to outputs (0: v; a: omega_a), times the parameters' lanes at `rows`. */
 TG_INLINE tg_lanes along(const tg_passage *p, int a, const tg_real *const *rows, int lane, const int n)
 {
-    if (a > 0) return lanes_mul(lanes_all(p->b[a - 1]), lanes_load(rows[a - 1] + lane));
-    tg_lanes sum = lanes_mul(lanes_all(-p->g), lanes_load(rows[n] + lane));
-    for (int i = 0; i < n; i++) sum = lanes_mul_add(lanes_all(p->c[i]), lanes_load(rows[i] + lane), sum);
+    if (a > 0) return p->b[a - 1] * lanes_load(rows[a - 1] + lane);
+    tg_lanes sum = -p->g * lanes_load(rows[n] + lane);
+    for (int i = 0; i < n; i++) sum += p->c[i] * lanes_load(rows[i] + lane);
     return sum;
 }
 
@@ -32,7 +32,7 @@ TG_INLINE void sensitivity_predict(tg_adaptation_state *s, const tg_filter *f, c
     for (int a = 0; a <= n; a++) {
         tg_real *const dx = s->dx + (n + 1 + a) * stride;
         const tg_lanes own = lanes_all(a ? p->phi[a - 1] : p->keep);
-        for (int l = 0; l < stride; l += TG_LANES) lanes_store(dx + l, lanes_mul_add(own, lanes_load(dx + l), along(p, a, rows, l, n)));
+        for (int l = 0; l < stride; l += TG_LANES) lanes_store(dx + l, along(p, a, rows, l, n) + own * lanes_load(dx + l));
     }
     for (int a = 0; a <= n; a++) { /* outputs by outputs, with the old outputs by parameters */
         const tg_lanes own = lanes_all(a ? p->phi[a - 1] : p->keep);
@@ -41,7 +41,7 @@ TG_INLINE void sensitivity_predict(tg_adaptation_state *s, const tg_filter *f, c
             tg_real *const dP = DP(n + 1 + a, n + 1 + b);
             const tg_lanes other = lanes_all(b ? p->phi[b - 1] : p->keep);
             for (int l = 0; l < stride; l += TG_LANES)
-                lanes_store(dP + l, lanes_mul(own, lanes_mul_add(other, lanes_load(dP + l), along(p, b, rows, l, n))));
+                lanes_store(dP + l, own * (along(p, b, rows, l, n) + other * lanes_load(dP + l)));
         }
     }
     for (int q = 0; q <= n; q++) { /* outputs by parameters */
@@ -49,14 +49,14 @@ TG_INLINE void sensitivity_predict(tg_adaptation_state *s, const tg_filter *f, c
         for (int a = 0; a <= n; a++) {
             tg_real *const dP = DP(n + 1 + a, q);
             const tg_lanes own = lanes_all(a ? p->phi[a - 1] : p->keep);
-            for (int l = 0; l < stride; l += TG_LANES) lanes_store(dP + l, lanes_mul_add(own, lanes_load(dP + l), along(p, a, rows, l, n)));
+            for (int l = 0; l < stride; l += TG_LANES) lanes_store(dP + l, along(p, a, rows, l, n) + own * lanes_load(dP + l));
         }
     }
     for (int b = 0; b <= n; b++) { /* the other half of outputs by outputs, with the new ones */
         for (int q = 0; q <= n; q++) rows[q] = DP(n + 1 + b, q);
         for (int a = b; a <= n; a++) {
             tg_real *const dP = DP(n + 1 + a, n + 1 + b);
-            for (int l = 0; l < stride; l += TG_LANES) lanes_store(dP + l, lanes_add(lanes_load(dP + l), along(p, a, rows, l, n)));
+            for (int l = 0; l < stride; l += TG_LANES) lanes_store(dP + l, lanes_load(dP + l) + along(p, a, rows, l, n));
         }
     }
     for (int j = 0; j < TG_TWICE(n); j++) DP(j, j)[j] += plan->gamma * s->scale[j] * f->walk[j] * p->dt;
@@ -75,26 +75,26 @@ TG_INLINE void sensitivity_update(tg_adaptation_state *s, const tgi_plan *plan, 
             if (o <= n)
                 column[i] = lanes_load(DP(i, n + 1 + o) + l);
             else
-                for (int q = 0; q <= n; q++) column[i] = lanes_mul_add(lanes_all(h[q]), lanes_load(DP(i, q) + l), column[i]);
+                for (int q = 0; q <= n; q++) column[i] += h[q] * lanes_load(DP(i, q) + l);
         }
         if (o <= n) {
             own = lanes_load(DP(n + 1 + o, n + 1 + o) + l);
             moved = lanes_load(s->dx + (n + 1 + o) * stride + l);
         } else
             for (int q = 0; q <= n; q++) {
-                own = lanes_mul_add(lanes_all(h[q]), column[q], own);
-                moved = lanes_mul_add(lanes_all(h[q]), lanes_load(s->dx + q * stride + l), moved);
+                own += h[q] * column[q];
+                moved += h[q] * lanes_load(s->dx + q * stride + l);
             }
         for (int i = 0; i < rows; i++) {
             tg_real *const dx = s->dx + i * stride + l;
-            rest[i] = lanes_mul_sub(lanes_all(K[i]), own, column[i]);
-            lanes_store(dx, lanes_mul_sub(lanes_all(K[i]), moved, lanes_mul_add(rest[i], ratio, lanes_load(dx))));
+            rest[i] = column[i] - K[i] * own;
+            lanes_store(dx, lanes_load(dx) + rest[i] * ratio - K[i] * moved);
         }
         for (int i = 0; i < rows; i++)
             for (int j = 0; j <= i; j++) {
                 tg_real *const dP = DP(i, j) + l;
-                const tg_lanes less = lanes_mul_sub(lanes_all(K[i]), rest[j], lanes_load(dP));
-                lanes_store(dP, lanes_mul_sub(lanes_all(K[j]), column[i], less));
+                const tg_lanes less = lanes_load(dP) - K[i] * rest[j];
+                lanes_store(dP, less - K[j] * column[i]);
             }
     }
 }
@@ -107,13 +107,13 @@ TG_INLINE void whiten(const tgi_result *result, int count, tg_lanes X[TG_MAX_WHE
             for (int b = 0; b < c; b++) {
                 const tg_lanes t = lanes_all(result->gain[b][n + 1 + result->channel[c]]);
                 for (int k = 0; k < count; k++) {
-                    if (side == 0) X[c][k] = lanes_mul_sub(t, X[b][k], X[c][k]);
-                    if (side == 1) X[k][c] = lanes_mul_sub(t, X[k][b], X[k][c]);
+                    if (side == 0) X[c][k] -= t * X[b][k];
+                    if (side == 1) X[k][c] -= t * X[k][b];
                 }
             }
     for (int c = 0; c < count; c++)
         for (int b = 0; b < count; b++)
-            X[c][b] = lanes_div(X[c][b], lanes_all(tgi_sqrt(result->residual_variance[c] * result->residual_variance[b])));
+            X[c][b] /= tgi_sqrt(result->residual_variance[c] * result->residual_variance[b]);
 }
 
 /* A step of ln a down V; the sensitivities are those before the update. */
@@ -129,8 +129,8 @@ TG_INLINE void descend(tg_adaptation_state *s, const tg_filter *f, const tgi_res
         whiten(result, n + 1, dS, n);
         for (int c = 0; c <= n; c++)
             for (int b = 0; b <= n; b++) {
-                slope = lanes_mul_add(excess[c][b], dS[c][b], slope);
-                curvature = lanes_mul_add(dS[c][b], dS[c][b], curvature);
+                slope += excess[c][b] * dS[c][b];
+                curvature += dS[c][b] * dS[c][b];
             }
         for (int j = l; j < l + TG_LANES && j < TG_TWICE(n); j++) { /* dV/d ln a = -2 slope: where C exceeds S, a grows */
             const tg_real step = f->tuning.rate * 2 * lanes_at(slope, j - l) / (2 * lanes_at(curvature, j - l) + CURVATURE_MIN);
@@ -168,8 +168,8 @@ TG_INLINE int is_finite(const tg_adaptation_state *s, const int n, const int str
     const int rows = TG_TWICE(n);
     tg_lanes zero = lanes_all(0);
     tg_real rest = 0;
-    for (int i = 0; i < rows * stride; i += TG_LANES) zero = lanes_mul_add(lanes_load(s->dx + i), lanes_all(0), zero);
-    for (int i = 0; i < pair(rows, 0) * stride; i += TG_LANES) zero = lanes_mul_add(lanes_load(s->dP + i), lanes_all(0), zero);
+    for (int i = 0; i < rows * stride; i += TG_LANES) zero += lanes_load(s->dx + i) * lanes_all(0);
+    for (int i = 0; i < pair(rows, 0) * stride; i += TG_LANES) zero += lanes_load(s->dP + i) * lanes_all(0);
     for (int j = 0; j < rows; j++) rest += s->scale[j] * 0;
     for (int c = 0; c <= n; c++)
         for (int b = 0; b <= n; b++) rest += s->C[c][b] * 0;

@@ -17,26 +17,26 @@ TG_INLINE void bank_factor(array *a, int rows, int columns, int joining, const t
     for (int j = rows - 1; j >= 0; j--) {
         const tg_lanes *const own = a->W[j];
         tg_lanes even = noise ? noise[j] : lanes_all(0), odd = lanes_all(TG_TINY);
-        for (int k = 0; k < columns; k++) v[k] = lanes_mul(a->weight[k], own[k]);
+        for (int k = 0; k < columns; k++) v[k] = a->weight[k] * own[k];
         for (int k = 0; k + 2 <= columns; k += 2) {
-            even = lanes_mul_add(v[k], own[k], even);
-            odd = lanes_mul_add(v[k + 1], own[k + 1], odd);
+            even += v[k] * own[k];
+            odd += v[k + 1] * own[k + 1];
         }
-        if (columns % 2) even = lanes_mul_add(v[columns - 1], own[columns - 1], even);
-        d[j] = lanes_add(even, odd);
-        const tg_lanes inverse = lanes_div(lanes_all(1), d[j]);
+        if (columns % 2) even += v[columns - 1] * own[columns - 1];
+        d[j] = even + odd;
+        const tg_lanes inverse = lanes_all(1) / d[j];
         u[j][j] = lanes_all(1);
         for (int i = 0; i < j; i++) {
             tg_lanes *const row = a->W[i];
             tg_lanes sum[4] = {lanes_all(0), lanes_all(0), lanes_all(0), lanes_all(0)};
             int k = 0;
             for (; k + 4 <= columns; k += 4)
-                for (int c = 0; c < 4; c++) sum[c] = lanes_mul_add(v[k + c], row[k + c], sum[c]);
-            for (; k < columns; k++) sum[0] = lanes_mul_add(v[k], row[k], sum[0]);
-            const tg_lanes part = lanes_mul(lanes_add(lanes_add(sum[0], sum[1]), lanes_add(sum[2], sum[3])), inverse);
+                for (int c = 0; c < 4; c++) sum[c] += v[k + c] * row[k + c];
+            for (; k < columns; k++) sum[0] += v[k] * row[k];
+            const tg_lanes part = (sum[0] + sum[1] + (sum[2] + sum[3])) * inverse;
             u[j][i] = part;
-            for (k = 0; k < columns; k++) row[k] = lanes_mul_sub(part, own[k], row[k]);
-            if (noise) row[columns] = lanes_sub(lanes_all(0), part);
+            for (k = 0; k < columns; k++) row[k] -= part * own[k];
+            if (noise) row[columns] = lanes_all(0) - part;
         }
         if (noise) a->weight[columns++] = noise[j];
         columns += joining;
@@ -99,7 +99,7 @@ static void mix(const tg_filter *f, tgi_modes *m, tg_lanes *probability, array *
     }
     for (int i = 0; i < all; i++) {
         a->weight[i] = share[i];
-        for (int k = 0; k < rows; k++) a->weight[all * (rows - k) + i] = lanes_mul(share[i], lanes_all(lanes_at(m->d[k], i)));
+        for (int k = 0; k < rows; k++) a->weight[all * (rows - k) + i] = share[i] * lanes_at(m->d[k], i);
     }
     bank_factor(a, rows, 2 * all, all, NULL, m->u, m->d);
 }
@@ -123,12 +123,12 @@ TG_INLINE void bank_variances(const tgi_plan *plan, const array *a, const tg_lan
     for (int o = 0; o < n + 2; o++) {
         if (!plan->present[o]) continue;
         S[o] = lanes_all(plan->r[o]);
-        if (o <= n) S[o] = lanes_add(S[o], noise[n + 1 + o]);
-        for (int i = 0; o > n && i <= n; i++) S[o] = lanes_mul_add(lanes_all(h[i] * h[i]), noise[i], S[o]);
+        if (o <= n) S[o] += noise[n + 1 + o];
+        for (int i = 0; o > n && i <= n; i++) S[o] += h[i] * h[i] * noise[i];
         for (int k = 0; k < TG_TWICE(n); k++) {
             tg_lanes along = o <= n ? a->W[n + 1 + o][k] : lanes_all(0);
-            for (int i = 0; o > n && i <= n; i++) along = lanes_mul_add(lanes_all(h[i]), a->W[i][k], along);
-            S[o] = lanes_mul_add(lanes_mul(a->weight[k], along), along, S[o]);
+            for (int i = 0; o > n && i <= n; i++) along += h[i] * a->W[i][k];
+            S[o] += a->weight[k] * along * along;
         }
     }
 }
@@ -138,24 +138,24 @@ TG_INLINE void bank_update_channel(const tgi_plan *plan, tgi_update *out, int o,
 {
     tgi_modes *const m = &out->state;
     tg_lanes *const K = out->gain[out->used];
-    tg_lanes variance = lanes_all(plan->r[o] / out->weight[o]), inverse = lanes_div(lanes_all(1), variance);
+    tg_lanes variance = lanes_all(plan->r[o] / out->weight[o]), inverse = lanes_all(1) / variance;
     for (int i = 0; i < TG_TWICE(n); i++) K[i] = lanes_all(0);
     for (int k = first; k < TG_TWICE(n); k++) {
-        const tg_lanes v = lanes_mul(m->d[k], along[k]), before = variance;
-        const tg_lanes back = lanes_mul(lanes_sub(lanes_all(0), along[k]), inverse);
-        variance = lanes_mul_add(along[k], v, variance);
-        inverse = lanes_div(lanes_all(1), variance);
-        m->d[k] = lanes_mul(m->d[k], lanes_mul(before, inverse));
+        const tg_lanes v = m->d[k] * along[k], before = variance;
+        const tg_lanes back = (lanes_all(0) - along[k]) * inverse;
+        variance += along[k] * v;
+        inverse = lanes_all(1) / variance;
+        m->d[k] *= (before * inverse);
         for (int i = 0; i < k; i++) {
             const tg_lanes old = m->u[k][i];
-            m->u[k][i] = lanes_mul_add(back, K[i], old);
-            K[i] = lanes_mul_add(v, old, K[i]);
+            m->u[k][i] = old + back * K[i];
+            K[i] += v * old;
         }
         K[k] = v;
     }
     for (int i = 0; i < TG_TWICE(n); i++) {
-        K[i] = lanes_mul(K[i], inverse);
-        m->x[i] = lanes_mul_add(K[i], residual, m->x[i]);
+        K[i] *= inverse;
+        m->x[i] += K[i] * residual;
     }
     bank_note(out, o, residual, variance, inverse);
 }
@@ -169,13 +169,13 @@ TG_INLINE void bank_update(const tgi_plan *plan, tgi_update *out, const int n)
         tg_lanes along[TG_MAX_STATES];
         if (!plan->present[o]) continue;
         for (int k = j; k < TG_TWICE(n); k++) along[k] = m->u[k][j];
-        bank_update_channel(plan, out, o, along, j, lanes_sub(lanes_all(plan->y[o]), m->x[j]), n);
+        bank_update_channel(plan, out, o, along, j, plan->y[o] - m->x[j], n);
     }
     if (!plan->present[n + 1]) return;
     tg_lanes along[TG_MAX_STATES];
     for (int k = 0; k < TG_TWICE(n); k++) {
         along[k] = lanes_all(0);
-        for (int i = 0; i <= n && i <= k; i++) along[k] = lanes_mul_add(lanes_all(h[i]), m->u[k][i], along[k]);
+        for (int i = 0; i <= n && i <= k; i++) along[k] += h[i] * m->u[k][i];
     }
     bank_update_channel(plan, out, n + 1, along, 0, bank_shock(plan, m->x, n), n);
 }
@@ -185,7 +185,7 @@ TG_INLINE tg_lanes coupling(const tgi_plan *plan, const tgi_update *out, int c, 
 {
     tg_lanes sum = lanes_all(0);
     if (out->channel[c] <= n) return out->gain[b][n + 1 + out->channel[c]];
-    for (int i = 0; i <= n; i++) sum = lanes_mul_add(lanes_all(plan->accelerometer[i]), out->gain[b][i], sum);
+    for (int i = 0; i <= n; i++) sum += plan->accelerometer[i] * out->gain[b][i];
     return sum;
 }
 
@@ -202,8 +202,8 @@ TG_INLINE tg_real mixture_nis(const tgi_plan *plan, const tgi_update *out, const
         T[c][c] = lanes_all(1);
         for (int b = 0; b < c; b++) T[c][b] = coupling(plan, out, c, b, n);
         for (int b = 0; b <= c; b++) {
-            tg_lanes sum = lanes_mul(out->offset[out->channel[c]], out->offset[out->channel[b]]);
-            for (int k = 0; k <= b; k++) sum = lanes_mul_add(lanes_mul(T[c][k], out->variance[k]), T[b][k], sum);
+            tg_lanes sum = out->offset[out->channel[c]] * out->offset[out->channel[b]];
+            for (int k = 0; k <= b; k++) sum += T[c][k] * out->variance[k] * T[b][k];
             S[c][b] = bank_mean(out->probability, sum);
         }
         if (plan->shares && out->channel[c] <= n) S[c][c] -= plan->shared[out->channel[c]];
@@ -240,11 +240,11 @@ static tg_real weigh(const tgi_update *out, tg_real *probability)
 
 static int is_finite(const tgi_update *out, int rows)
 {
-    tg_lanes zero = lanes_mul(out->nis, lanes_all(0));
+    tg_lanes zero = out->nis * lanes_all(0);
     for (int k = 0; k < rows; k++) {
-        zero = lanes_mul_add(out->state.x[k], lanes_all(0), zero);
-        zero = lanes_mul_add(out->state.d[k], lanes_all(0), zero);
-        for (int i = 0; i < k; i++) zero = lanes_mul_add(out->state.u[k][i], lanes_all(0), zero);
+        zero += out->state.x[k] * lanes_all(0);
+        zero += out->state.d[k] * lanes_all(0);
+        for (int i = 0; i < k; i++) zero += out->state.u[k][i] * lanes_all(0);
     }
     return lanes_sum(zero) == 0;
 }
@@ -315,7 +315,7 @@ tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *step)
     tg_lanes noise[TG_MAX_STATES];
     tg_real nis = 0, log_likelihood = 0, probability[TG_MODES];
     for (int j = 0; j < TG_TWICE(n); j++)
-        noise[j] = lanes_mul_add(scales, lanes_all(f->walk[j] * plan->passage.dt), lanes_all(plan->passage.q[j]));
+        noise[j] = plan->passage.q[j] + scales * (f->walk[j] * plan->passage.dt);
     work_out(f, plan, mixes, noise, &out, n);
     lanes_store(probability, out.probability);
     if (plan->count) {
@@ -338,13 +338,13 @@ void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P)
     for (int i = 0; i < f->states; i++) {
         const tg_lanes own = lanes_load(bank->x[i]);
         x[i] = bank_mean(probability, own);
-        away[i] = lanes_sub(own, lanes_all(x[i]));
+        away[i] = own - x[i];
     }
     for (int i = 0; P && i < f->states; i++)
         for (int j = 0; j <= i; j++) {
-            tg_lanes sum = lanes_mul(away[i], away[j]);
+            tg_lanes sum = away[i] * away[j];
             for (int k = i; k < f->states; k++)
-                sum = lanes_mul_add(lanes_mul(lanes_load(bank->d[k]), lanes_load(bank->u[k][i])), lanes_load(bank->u[k][j]), sum);
+                sum += lanes_load(bank->d[k]) * lanes_load(bank->u[k][i]) * lanes_load(bank->u[k][j]);
             P[i * f->stride + j] = bank_mean(probability, sum);
         }
 }
@@ -363,7 +363,7 @@ void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage)
         for (int i = 0; i <= n; i++) a.W[i][k] = i <= k ? m.u[k][i] : lanes_all(0);
     }
     for (int j = 0; j <= n; j++) {
-        noise[j] = lanes_mul(scales, lanes_all(passage->q[j]));
+        noise[j] = scales * passage->q[j];
         passage->q[j] = bank_mean(probability, noise[j]);
     }
     bank_factor(&a, n + 1, f->states, 0, noise, m.u, m.d);

@@ -18,7 +18,7 @@ typedef struct {
     int32_t used, channel[TG_MAX_CHANNELS];
 } tgi_update;
 
-TG_INLINE tg_real bank_mean(tg_lanes probability, tg_lanes a) { return lanes_sum(lanes_mul(probability, a)); }
+TG_INLINE tg_real bank_mean(tg_lanes probability, tg_lanes a) { return lanes_sum(probability * a); }
 
 /* share[i]: weight of mode i in each mode's mixture, `elapsed` s after the last mixing. The probabilities move by the transition matrix. */
 TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probability, tg_lanes *share)
@@ -29,9 +29,9 @@ TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probabi
         tg_real row[TG_MODES];
         for (int j = 0; j < TG_MODES; j++) row[j] = (i == j ? stay : leave) * lanes_at(*probability, i);
         share[i] = lanes_load(row);
-        total = lanes_add(total, share[i]);
+        total += share[i];
     }
-    for (int i = 0; i < TG_MODES; i++) share[i] = lanes_div(share[i], total);
+    for (int i = 0; i < TG_MODES; i++) share[i] /= total;
     *probability = total;
 }
 
@@ -39,27 +39,27 @@ TG_INLINE void bank_shares(const tg_filter *f, double elapsed, tg_lanes *probabi
 TG_INLINE tg_lanes bank_mix_mean(const tg_lanes *share, tg_lanes x, tg_lanes *away)
 {
     tg_lanes mixed = lanes_all(0);
-    for (int i = 0; i < TG_MODES; i++) mixed = lanes_mul_add(share[i], lanes_all(lanes_at(x, i)), mixed);
-    for (int i = 0; i < TG_MODES; i++) away[i] = lanes_sub(lanes_all(lanes_at(x, i)), mixed);
+    for (int i = 0; i < TG_MODES; i++) mixed += share[i] * lanes_at(x, i);
+    for (int i = 0; i < TG_MODES; i++) away[i] = lanes_at(x, i) - mixed;
     return mixed;
 }
 
 /* The affine map on one vector a mode: a column of factors, or the means. */
 TG_INLINE void bank_map(const tg_passage *p, const tg_lanes *from, tg_lanes *to, const int n)
 {
-    tg_lanes v = lanes_mul_sub(lanes_all(p->g), from[n], from[n + 1]);
-    for (int i = 0; i < n; i++) v = lanes_mul_add(lanes_all(p->c[i]), from[i], v);
+    tg_lanes v = from[n + 1] - p->g * from[n];
+    for (int i = 0; i < n; i++) v += p->c[i] * from[i];
     for (int i = 0; i <= n; i++) to[i] = from[i];
     to[n + 1] = v;
     for (int i = 0; i < n; i++)
-        to[n + 2 + i] = lanes_mul_add(lanes_all(p->b[i]), from[i], lanes_mul(lanes_all(p->phi[i]), from[n + 2 + i]));
+        to[n + 2 + i] = p->phi[i] * from[n + 2 + i] + p->b[i] * from[i];
 }
 
 /* Predicted means. */
 TG_INLINE void bank_move(const tgi_plan *plan, const tg_lanes *from, tg_lanes *to, const int n)
 {
     bank_map(&plan->passage, from, to, n);
-    for (int i = n + 1; i < TG_TWICE(n); i++) to[i] = lanes_add(to[i], lanes_all(plan->shift[i]));
+    for (int i = n + 1; i < TG_TWICE(n); i++) to[i] += plan->shift[i];
 }
 
 /* Innovations of the mixture and their variances, and the weights, before any update. S: each mode's own variances. */
@@ -68,11 +68,11 @@ TG_INLINE void bank_innovations(const tg_filter *f, const tgi_plan *plan, const 
     for (int o = 0; o < n + 2; o++) {
         if (!plan->present[o]) continue;
         tg_lanes expected = o <= n ? out->state.x[n + 1 + o] : lanes_all(plan->accelerometer_shift);
-        for (int i = 0; o > n && i <= n; i++) expected = lanes_mul_add(lanes_all(plan->accelerometer[i]), out->state.x[i], expected);
+        for (int i = 0; o > n && i <= n; i++) expected += plan->accelerometer[i] * out->state.x[i];
         const tg_real centre = bank_mean(out->probability, expected);
-        out->offset[o] = lanes_sub(expected, lanes_all(centre));
+        out->offset[o] = expected - centre;
         out->innovation[o] = plan->y[o] - centre;
-        out->innovation_variance[o] = bank_mean(out->probability, lanes_mul_add(out->offset[o], out->offset[o], S[o]));
+        out->innovation_variance[o] = bank_mean(out->probability, S[o] + out->offset[o] * out->offset[o]);
         out->weight[o] = tgi_weight(f->tuning.huber, out->innovation[o], out->innovation_variance[o]);
     }
 }
@@ -81,15 +81,15 @@ TG_INLINE void bank_innovations(const tg_filter *f, const tgi_plan *plan, const 
 TG_INLINE tg_lanes bank_shock(const tgi_plan *plan, const tg_lanes *x, const int n)
 {
     tg_lanes residual = lanes_all(plan->y[n + 1] - plan->accelerometer_shift);
-    for (int i = 0; i <= n; i++) residual = lanes_mul_sub(lanes_all(plan->accelerometer[i]), x[i], residual);
+    for (int i = 0; i <= n; i++) residual -= plan->accelerometer[i] * x[i];
     return residual;
 }
 
 /* What a channel leaves: its residual, and the variance of that. */
 TG_INLINE void bank_note(tgi_update *out, int o, tg_lanes residual, tg_lanes variance, tg_lanes inverse)
 {
-    out->nis = lanes_mul_add(lanes_mul(residual, residual), inverse, out->nis);
-    out->volume = lanes_mul(out->volume, variance);
+    out->nis += residual * residual * inverse;
+    out->volume *= variance;
     out->channel[out->used] = o;
     out->residual[out->used] = residual;
     out->variance[out->used++] = variance;

@@ -25,16 +25,16 @@ TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_de
     {
         const tg_lanes rho = lanes_load(c->s[n] + k);
         lanes_store(c->prior[n] + k, rho);
-        lanes_store(c->s[n + 1] + k, lanes_mul_sub(g, rho, lanes_mul(keep, lanes_load(c->s[n + 1] + k))));
+        lanes_store(c->s[n + 1] + k, keep * lanes_load(c->s[n + 1] + k) - g * rho);
     }
     for (int i = 0; i < n; i++) {
         const tg_lanes phi = lanes_all(p->phi[i]), psi = lanes_all(p->psi[i]), to_omega = lanes_all(p->b[i]), to_v = lanes_all(p->c[i]);
         EACH(k)
         {
             const tg_lanes mu = lanes_load(c->s[i] + k);
-            tg_lanes omega = lanes_mul_add(to_omega, mu, lanes_mul(phi, lanes_load(c->s[n + 2 + i] + k)));
-            if (d) omega = lanes_mul_add(psi, lanes_load(d->wheel_acceleration[i] + k), omega);
-            lanes_store(c->s[n + 1] + k, lanes_mul_add(to_v, mu, lanes_load(c->s[n + 1] + k)));
+            tg_lanes omega = phi * lanes_load(c->s[n + 2 + i] + k) + to_omega * mu;
+            if (d) omega += psi * lanes_load(d->wheel_acceleration[i] + k);
+            lanes_store(c->s[n + 1] + k, lanes_load(c->s[n + 1] + k) + to_v * mu);
             lanes_store(c->prior[i] + k, mu);
             lanes_store(c->prior[n + 2 + i] + k, omega);
             lanes_store(c->s[n + 2 + i] + k, omega);
@@ -43,7 +43,7 @@ TG_INLINE void consider_predict(tg_consider *c, const tg_passage *p, const tg_de
     EACH(k)
     {
         tg_lanes v = lanes_load(c->s[n + 1] + k);
-        if (d) v = lanes_mul_add(dt, lanes_load(d->acceleration + k), v);
+        if (d) v += dt * lanes_load(d->acceleration + k);
         lanes_store(c->prior[n + 1] + k, v);
         lanes_store(c->s[n + 1] + k, v);
     }
@@ -62,11 +62,11 @@ TG_INLINE void consider_update(tg_consider *c, const tg_filter *f, const tg_real
         }
         for (int i = 0; o > n && i <= n; i++) {
             const tg_lanes a = lanes_all(f->accelerometer[i]);
-            EACH(k) lanes_store(shift + k, lanes_mul_add(a, lanes_load(c->s[i] + k), lanes_load(shift + k)));
+            EACH(k) lanes_store(shift + k, lanes_load(shift + k) + a * lanes_load(c->s[i] + k));
         }
         for (int j = 0; j < TG_TWICE(n); j++) {
             const tg_lanes share = lanes_all(gain[m][j]);
-            EACH(k) lanes_store(c->s[j] + k, lanes_mul_sub(share, lanes_load(shift + k), lanes_load(c->s[j] + k)));
+            EACH(k) lanes_store(c->s[j] + k, lanes_load(c->s[j] + k) - share * lanes_load(shift + k));
         }
     }
 }
@@ -83,7 +83,7 @@ static void mean_gains(const tg_filter *f, tg_real (*mean)[TG_ROWS])
     const tg_bank_state *const bank = &f->policy.bank;
     const tg_lanes probability = lanes_load(bank->probability);
     for (int m = 0; m < f->used; m++)
-        for (int i = 0; i < f->states; i++) mean[m][i] = lanes_sum(lanes_mul(probability, lanes_load(bank->gain[m][i])));
+        for (int i = 0; i < f->states; i++) mean[m][i] = lanes_sum(probability * lanes_load(bank->gain[m][i]));
 }
 
 /* Whether every number is finite. */
@@ -92,8 +92,8 @@ static int deviations_are_finite(const tg_deviations *d, int columns, int n)
     const tg_lanes none = lanes_all(0);
     tg_lanes zero = none; /* NaN, from an infinite or NaN term */
     for (int k = 0; k < columns; k += TG_LANES) {
-        zero = lanes_mul_add(lanes_load(d->acceleration + k), none, lanes_mul_add(lanes_load(d->accelerometer + k), none, zero));
-        for (int i = 0; i < n; i++) zero = lanes_mul_add(lanes_load(d->wheel_acceleration[i] + k), none, zero);
+        zero = zero + lanes_load(d->accelerometer + k) * none + lanes_load(d->acceleration + k) * none;
+        for (int i = 0; i < n; i++) zero += lanes_load(d->wheel_acceleration[i] + k) * none;
     }
     return lanes_sum(zero) == 0;
 }

@@ -51,23 +51,23 @@ TG_INLINE void block_predict(const map *m, const tg_real *q, const tgi_block *P,
     transpose(P->omega_mu, Y, n);
     for (int i = 0; i < n; i++) {
         const tg_lanes c = lanes_all(lanes_at(m->c, i));
-        pull = lanes_mul_add(c, P->mu[i], pull);
-        wheels = lanes_mul_add(c, Y[i], wheels);
+        pull += c * P->mu[i];
+        wheels += c * Y[i];
     }
-    const tg_lanes v_mu = lanes_mul_sub(g, P->rho_mu, pull), v_old_omega = lanes_mul_sub(g, P->rho_omega, wheels);
-    const tg_lanes v_omega = lanes_mul_add(m->b, v_mu, lanes_mul(m->phi, v_old_omega));
-    const tg_lanes rho_omega = lanes_mul_add(m->b, P->rho_mu, lanes_mul(m->phi, P->rho_omega));
+    const tg_lanes v_mu = pull - g * P->rho_mu, v_old_omega = wheels - g * P->rho_omega;
+    const tg_lanes v_omega = m->phi * v_old_omega + m->b * v_mu;
+    const tg_lanes rho_omega = m->phi * P->rho_omega + m->b * P->rho_mu;
     const tg_real rho = lanes_at(P->rho_rest, 0), v_rho = lanes_at(P->v_rest, 0);
-    const tg_real cross = (v_rho - m->g * rho) + lanes_sum(lanes_mul(m->c, P->rho_mu));
-    const tg_real v = (lanes_at(P->v_rest, 1) - m->g * (v_rho + cross)) + lanes_sum(lanes_mul(m->c, lanes_add(P->v_mu, v_mu)));
+    const tg_real cross = (v_rho - m->g * rho) + lanes_sum(m->c * P->rho_mu);
+    const tg_real v = (lanes_at(P->v_rest, 1) - m->g * (v_rho + cross)) + lanes_sum(m->c * (P->v_mu + v_mu));
     for (int j = 0; j < n; j++) {
         const tg_lanes phi = lanes_all(lanes_at(m->phi, j)), b = lanes_all(lanes_at(m->b, j));
-        const tg_lanes mixed = lanes_mul_add(lanes_mul(phi, m->b), P->omega_mu[j], lanes_mul(lanes_mul(b, m->phi), Y[j]));
-        const tg_lanes own = lanes_mul_add(lanes_mul(b, m->b), P->mu[j], lanes_mul(lanes_mul(phi, m->phi), P->omega[j]));
-        to->omega[j] = lanes_mul_add(lanes_all(q[n + 2 + j]), unit(j), lanes_add(own, mixed));
-        to->omega_mu[j] = lanes_mul_add(b, P->mu[j], lanes_mul(phi, P->omega_mu[j]));
+        const tg_lanes mixed = b * m->phi * Y[j] + phi * m->b * P->omega_mu[j];
+        const tg_lanes own = phi * m->phi * P->omega[j] + b * m->b * P->mu[j];
+        to->omega[j] = own + mixed + q[n + 2 + j] * unit(j);
+        to->omega_mu[j] = phi * P->omega_mu[j] + b * P->mu[j];
         to->omega_rest[j] = lanes_of(lanes_at(rho_omega, j), lanes_at(v_omega, j), 0, 0);
-        to->mu[j] = lanes_mul_add(lanes_all(q[j]), unit(j), P->mu[j]);
+        to->mu[j] = P->mu[j] + q[j] * unit(j);
     }
     to->rho_mu = P->rho_mu;
     to->rho_rest = lanes_of(rho + q[n], cross, 0, 0);
@@ -80,9 +80,12 @@ TG_INLINE void block_predict(const map *m, const tg_real *q, const tgi_block *P,
 /* The first half of the bound: every state's noise is a share of its variance. False for what is no number, too. */
 TG_INLINE int noise_holds(const tg_real *q, const tgi_block *P, const int n)
 {
-    int holds = (q[n] >= TGI_NOISE_SHARE * lanes_at(P->rho_rest, 0)) & (q[n + 1] >= TGI_NOISE_SHARE * lanes_at(P->v_rest, 1));
-    for (int i = 0; i < n; i++)
-        holds &= (q[i] >= TGI_NOISE_SHARE * lanes_at(P->mu[i], i)) & (q[n + 2 + i] >= TGI_NOISE_SHARE * lanes_at(P->omega[i], i));
+    int holds = q[n] >= TGI_NOISE_SHARE * lanes_at(P->rho_rest, 0);
+    holds &= q[n + 1] >= TGI_NOISE_SHARE * lanes_at(P->v_rest, 1);
+    for (int i = 0; i < n; i++) {
+        holds &= q[i] >= TGI_NOISE_SHARE * lanes_at(P->mu[i], i);
+        holds &= q[n + 2 + i] >= TGI_NOISE_SHARE * lanes_at(P->omega[i], i);
+    }
     return holds;
 }
 
@@ -90,22 +93,22 @@ TG_INLINE int noise_holds(const tg_real *q, const tgi_block *P, const int n)
 TG_INLINE void block_update(tgi_block *P, const tgi_gain *h, tg_real one_over, tgi_gain *K, const int n)
 {
     const tg_lanes inverse = lanes_all(one_over), h_rho = lanes_all(lanes_at(h->rest, 0)), h_v = lanes_all(lanes_at(h->rest, 1));
-    K->mu = lanes_mul(h->mu, inverse);
-    K->rest = lanes_mul(h->rest, inverse);
-    K->omega = lanes_mul(h->omega, inverse);
+    K->mu = h->mu * inverse;
+    K->rest = h->rest * inverse;
+    K->omega = h->omega * inverse;
     for (int i = 0; i < n; i++) {
         const tg_lanes mu = lanes_all(lanes_at(h->mu, i)), omega = lanes_all(lanes_at(h->omega, i)), k = lanes_all(lanes_at(K->omega, i));
-        P->mu[i] = lanes_mul_sub(lanes_mul(mu, h->mu), inverse, P->mu[i]);
-        P->omega[i] = lanes_mul_sub(lanes_mul(omega, h->omega), inverse, P->omega[i]);
-        P->omega_mu[i] = lanes_mul_sub(omega, K->mu, P->omega_mu[i]);
-        P->omega_rest[i] = lanes_mul_sub(k, h->rest, P->omega_rest[i]);
+        P->mu[i] -= mu * h->mu * inverse;
+        P->omega[i] -= omega * h->omega * inverse;
+        P->omega_mu[i] -= omega * K->mu;
+        P->omega_rest[i] -= k * h->rest;
     }
-    P->rho_mu = lanes_mul_sub(h_rho, K->mu, P->rho_mu);
-    P->rho_rest = lanes_mul_sub(lanes_mul(h_rho, h->rest), inverse, P->rho_rest);
-    P->rho_omega = lanes_mul_sub(h_rho, K->omega, P->rho_omega);
-    P->v_mu = lanes_mul_sub(h_v, K->mu, P->v_mu);
-    P->v_rest = lanes_mul_sub(lanes_mul(h_v, h->rest), inverse, P->v_rest);
-    P->v_omega = lanes_mul_sub(h_v, K->omega, P->v_omega);
+    P->rho_mu -= h_rho * K->mu;
+    P->rho_rest -= h_rho * h->rest * inverse;
+    P->rho_omega -= h_rho * K->omega;
+    P->v_mu -= h_v * K->mu;
+    P->v_rest -= h_v * h->rest * inverse;
+    P->v_omega -= h_v * K->omega;
 }
 
 typedef struct { /* the step on its way */
@@ -133,9 +136,9 @@ TG_INLINE void update_channel(channel_updates *t, int o, const tgi_gain *h, tg_r
     tgi_gain *const K = &out->gain[out->used];
     block_update(&out->P, h, inverse, K, n);
     const tg_lanes nu = lanes_all(residual);
-    out->x.mu = lanes_mul_add(nu, K->mu, out->x.mu);
-    out->x.rest = lanes_mul_add(nu, K->rest, out->x.rest);
-    out->x.omega = lanes_mul_add(nu, K->omega, out->x.omega);
+    out->x.mu += nu * K->mu;
+    out->x.rest += nu * K->rest;
+    out->x.omega += nu * K->omega;
     tgi_result *const result = out->result;
     result->channel[out->used] = o;
     result->residual[out->used] = residual;
@@ -146,7 +149,7 @@ TG_INLINE void update_channel(channel_updates *t, int o, const tgi_gain *h, tg_r
     out->used++;
 }
 
-TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(lanes_mul(a, b)); }
+TG_INLINE tg_real dot(tg_lanes a, tg_lanes b) { return lanes_sum(a * b); }
 
 typedef struct { /* covariance of a_x with mu, rho_s, v and omega, and its own */
     tg_lanes mu, omega;
@@ -159,14 +162,14 @@ TG_INLINE shock shock_of(const tgi_block *P, tg_lanes a, tg_real a_rho, const in
     shock s;
     tg_lanes Y[TG_LANES];
     transpose(P->omega_mu, Y, n);
-    s.mu = lanes_mul(weight, P->rho_mu);
-    s.omega = lanes_mul(weight, P->rho_omega);
+    s.mu = weight * P->rho_mu;
+    s.omega = weight * P->rho_omega;
     for (int i = 0; i < n; i++) {
         const tg_lanes own = lanes_all(lanes_at(a, i));
-        s.mu = lanes_mul_add(own, P->mu[i], s.mu);
-        s.omega = lanes_mul_add(own, Y[i], s.omega);
+        s.mu += own * P->mu[i];
+        s.omega += own * Y[i];
     }
-    const tg_lanes rest = lanes_mul_add(weight, P->rho_rest, lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0));
+    const tg_lanes rest = lanes_of(dot(a, P->rho_mu), dot(a, P->v_mu), 0, 0) + weight * P->rho_rest;
     s.rho = lanes_at(rest, 0);
     s.v = lanes_at(rest, 1);
     s.own = dot(a, s.mu) + a_rho * s.rho;
@@ -183,8 +186,8 @@ TG_INLINE void eliminate(nis_square *s, tg_real pivot, tg_real least, tg_real in
 {
     const tg_real inverse = 1 / (pivot > least ? pivot : least), share = innovation * inverse;
     s->sum += innovation * share;
-    s->nu = lanes_mul_sub(lanes_all(share), row, s->nu);
-    for (int i = 0; i <= last; i++) s->W[i] = lanes_mul_sub(lanes_all(lanes_at(row, i) * inverse), row, s->W[i]);
+    s->nu -= share * row;
+    for (int i = 0; i <= last; i++) s->W[i] -= lanes_at(row, i) * inverse * row;
 }
 
 /* As tgi_nis has it, but v and a_x first; the wheels, a row at once, are to follow. */
@@ -196,7 +199,7 @@ TG_INLINE void nis_begin(const tgi_plan *plan, const channel_updates *t, const s
     tg_lanes of_a = a->omega;
     s->sum = 0;
     s->nu = load_wheels(innovation + 1, n);
-    for (int i = 0; i < n; i++) s->W[i] = lanes_mul_add(lanes_all(t->r[1 + i] - plan->shared[1 + i]), unit(i), P->omega[i]);
+    for (int i = 0; i < n; i++) s->W[i] = P->omega[i] + (t->r[1 + i] - plan->shared[1 + i]) * unit(i);
     tg_real own = a->own + t->r[n + 1], nu_a = innovation[n + 1];
     if (plan->present[0]) {
         const tg_real v = lanes_at(P->v_rest, 1) + t->r[0] - plan->shared[0];
@@ -204,7 +207,7 @@ TG_INLINE void nis_begin(const tgi_plan *plan, const channel_updates *t, const s
             const tg_real k = a->v / v;
             own -= k * a->v;
             nu_a -= k * innovation[0];
-            of_a = lanes_mul_sub(lanes_all(k), of_v, of_a);
+            of_a -= k * of_v;
         }
         eliminate(s, v, t->r[0], innovation[0], of_v, n - 1);
     }
@@ -253,8 +256,8 @@ TG_INLINE int is_finite(const tgi_direct *out, const int n)
 {
     const tgi_block *const P = &out->P;
     const tg_lanes none = lanes_all(0);
-    tg_lanes a = lanes_mul(out->x.mu, none), b = lanes_mul(out->x.rest, none);
-#define ADD(to, x) to = lanes_mul_add(x, none, to)
+    tg_lanes a = out->x.mu * none, b = out->x.rest * none;
+#define ADD(to, x) to += x * none
     ADD(a, out->x.omega);
     ADD(b, P->rho_mu);
     ADD(a, P->rho_rest);
@@ -268,7 +271,7 @@ TG_INLINE int is_finite(const tgi_direct *out, const int n)
         ADD(a, P->omega_mu[i]);
     }
 #undef ADD
-    return lanes_sum(lanes_add(a, b)) == 0;
+    return lanes_sum(a + b) == 0;
 }
 
 TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *plan, tgi_direct *out, const int n, const int stride)
@@ -283,7 +286,7 @@ TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *
     const tg_lanes mu = load_wheels(x, n), omega = load_wheels(x + n + 2, n);
     out->x.mu = mu;
     out->x.rest = lanes_of(x[n], (x[n + 1] - m.g * x[n]) + dot(m.c, mu) + shift[n + 1], 0, 0);
-    out->x.omega = lanes_add(lanes_mul_add(m.b, mu, lanes_mul(m.phi, omega)), load_wheels(shift + n + 2, n));
+    out->x.omega = m.phi * omega + m.b * mu + load_wheels(shift + n + 2, n);
     out->x_prior = out->x;
     out->used = out->judged = 0;
     out->result->square = 0;

@@ -43,7 +43,7 @@ TG_INLINE void exact_update(const tg_filter *f, const tgi_plan *plan, tgi_result
     const tg_real r = weight < 1 ? plan->r[o] / weight : plan->r[o];
     const tg_real inverse = factor_measure(out->u, out->d, along, spread, first, TG_TWICE(n), stride, r, gain);
     for (int i = 0; i < stride; i += TG_LANES)
-        lanes_store(out->x + i, lanes_mul_add(lanes_all(residual), lanes_load(gain + i), lanes_load(out->x + i)));
+        lanes_store(out->x + i, lanes_load(out->x + i) + residual * lanes_load(gain + i));
     out->channel[used] = o;
     out->residual[used] = residual;
     out->residual_variance[used] = r + sum;

@@ -29,7 +29,7 @@ void tgi_covariance(int rows, int stride, const tg_real *u, const tg_real *d, tg
         for (int l = 0; l < lanes; l++) sum[l] = lanes_all(0);
         for (int k = i; k < rows; k++) {
             const tg_lanes v = lanes_all(d[k] * u[k * stride + i]);
-            for (int l = 0; l < lanes; l++) sum[l] = lanes_mul_add(v, lanes_load(u + k * stride + TG_LANES * l), sum[l]);
+            for (int l = 0; l < lanes; l++) sum[l] += v * lanes_load(u + k * stride + TG_LANES * l);
         }
         for (int l = 0; l < lanes; l++) lanes_store(P + i * stride + TG_LANES * l, sum[l]);
     }
@@ -78,28 +78,28 @@ static const tg_real ABOVE[TG_LANES][2 * TG_LANES] = {
 TG_INLINE void row_of_lanes(tgi_gram *g, int j, const int lanes, int joins, tg_real noise, tg_real *u, tg_real *d)
 {
     const int stride = g->stride, columns = g->columns, previous = g->previous, chains = lanes > 2 ? 2 : 4; /* additions wait for each other */
-    const tg_lanes part_j = lanes_spread(g->part[lanes - 1], j % TG_LANES);
+    const tg_lanes part_j = lanes_all(lanes_at(g->part[lanes - 1], j % TG_LANES));
     tg_lanes part[TG_MOST_LANES], sum[4][TG_MOST_LANES];
     const tg_real *const above = ABOVE[j % TG_LANES];
     for (int i = 0; i < lanes; i++) part[i] = g->part[i];
     for (int c = 0; c < 4; c++)
         for (int i = 0; i < lanes; i++) sum[c][i] = lanes_all(0);
-    sum[0][lanes - 1] = lanes_mul(lanes_all(noise + TG_TINY), lanes_load(above + TG_LANES));
+    sum[0][lanes - 1] = (noise + TG_TINY) * lanes_load(above + TG_LANES);
     if (g->joins) { /* the last row's own column, just projected on itself */
         tg_real *const own = g->W + columns * stride;
-        for (int i = 0; i < lanes; i++) lanes_store(own + TG_LANES * i, lanes_sub(lanes_all(0), part[i]));
-        const tg_lanes v = lanes_mul(lanes_all(g->noise), part_j);
-        for (int i = 0; i < lanes; i++) sum[chains - 1][i] = lanes_mul(v, part[i]);
+        for (int i = 0; i < lanes; i++) lanes_store(own + TG_LANES * i, lanes_all(0) - part[i]);
+        const tg_lanes v = g->noise * part_j;
+        for (int i = 0; i < lanes; i++) sum[chains - 1][i] = v * part[i];
     }
 #define COLUMN(k, chain)                                                                              \
     {                                                                                                 \
         tg_real *const w = g->W + (k) * stride;                                                       \
         const tg_lanes taken = lanes_all(w[previous]);                                                \
         for (int i = 0; i < lanes; i++)                                                               \
-            lanes_store(w + TG_LANES * i, lanes_mul_sub(part[i], taken, lanes_load(w + TG_LANES * i))); \
+            lanes_store(w + TG_LANES * i, lanes_load(w + TG_LANES * i) - part[i] * taken); \
         const tg_lanes v = lanes_all(g->weight[k] * w[j]);                                            \
         for (int i = 0; i < lanes; i++)                                                               \
-            sum[(chain) % chains][i] = lanes_mul_add(v, lanes_load(w + TG_LANES * i), sum[(chain) % chains][i]); \
+            sum[(chain) % chains][i] += v * lanes_load(w + TG_LANES * i); \
     }
     int k = 0;
     for (; k + 4 <= columns; k += 4) {
@@ -114,14 +114,14 @@ TG_INLINE void row_of_lanes(tgi_gram *g, int j, const int lanes, int joins, tg_r
 #undef COLUMN
     if (g->joins) g->weight[g->columns++] = g->noise;
     for (int i = 0; i < lanes; i++) {
-        sum[0][i] = lanes_add(sum[0][i], sum[1][i]);
-        if (chains == 4) sum[0][i] = lanes_add(sum[0][i], lanes_add(sum[2][i], sum[3][i]));
+        sum[0][i] += sum[1][i];
+        if (chains == 4) sum[0][i] += sum[2][i] + sum[3][i];
     }
-    const tg_lanes whole = lanes_spread(sum[0][lanes - 1], j % TG_LANES);
-    const tg_lanes inverse = lanes_div(lanes_all(1), whole);
-    for (int i = 0; i < lanes; i++) g->part[i] = lanes_mul(sum[0][i], inverse);
+    const tg_lanes whole = lanes_all(lanes_at(sum[0][lanes - 1], j % TG_LANES));
+    const tg_lanes inverse = lanes_all(1) / whole;
+    for (int i = 0; i < lanes; i++) g->part[i] = sum[0][i] * inverse;
     for (int i = 0; i + 1 < lanes; i++) lanes_store(u + TG_LANES * i, g->part[i]);
-    lanes_store(u + TG_LANES * (lanes - 1), lanes_mul_add(lanes_load(above), g->part[lanes - 1], lanes_load(above + TG_LANES)));
+    lanes_store(u + TG_LANES * (lanes - 1), lanes_load(above + TG_LANES) + lanes_load(above) * g->part[lanes - 1]);
     for (int i = lanes; i < stride / TG_LANES; i++) lanes_store(u + TG_LANES * i, lanes_all(0));
     *d = lanes_at(whole, 0);
     g->joins = joins;

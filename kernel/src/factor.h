@@ -45,11 +45,11 @@ TG_INLINE tg_real factor_measure(tg_real *u, tg_real *d, const tg_real *f, const
         d[k] *= before * inverse;
         for (int i = 0; i < lanes; i++) {
             const tg_lanes old = lanes_load(column + TG_LANES * i);
-            lanes_store(column + TG_LANES * i, lanes_mul_add(back, K[i], old));
-            K[i] = lanes_mul_add(v, old, K[i]);
+            lanes_store(column + TG_LANES * i, old + back * K[i]);
+            K[i] += v * old;
         }
     }
-    for (int i = 0; i < lanes; i++) lanes_store(gain + TG_LANES * i, lanes_mul(K[i], lanes_all(inverse)));
+    for (int i = 0; i < lanes; i++) lanes_store(gain + TG_LANES * i, K[i] * inverse);
     return inverse;
 }
 #endif

@@ -141,12 +141,12 @@ TG_INLINE int result_is_finite(const tgi_result *result, const int n, const int 
     const tg_lanes none = lanes_all(0);
     tg_lanes zero[4] = {none, none, none, lanes_all(result->log_likelihood * 0)};
     for (int i = 0; i < stride; i += TG_LANES) {
-        zero[0] = lanes_mul_add(lanes_load(result->x + i), none, zero[0]);
-        zero[1] = lanes_mul_add(lanes_load(result->d + i), none, zero[1]);
+        zero[0] += lanes_load(result->x + i) * none;
+        zero[1] += lanes_load(result->d + i) * none;
         for (int k = i; k < TG_TWICE(n); k++) /* columns that reach this lane */
-            zero[k % 4] = lanes_mul_add(lanes_load(result->u + k * stride + i), none, zero[k % 4]);
+            zero[k % 4] += lanes_load(result->u + k * stride + i) * none;
     }
-    return lanes_sum(lanes_add(lanes_add(zero[0], zero[1]), lanes_add(zero[2], zero[3]))) == 0;
+    return lanes_sum(zero[0] + zero[1] + (zero[2] + zero[3])) == 0;
 }
 
 /* What a step leaves besides the belief. */

@@ -1,5 +1,5 @@
-/* The kernel's arithmetic: functions of tg_real, and four numbers that are computed on at once. A processor without registers this wide
- * computes them in parts, in the same order of operations and so to the same bits. */
+/* The kernel's arithmetic: functions of tg_real, and four numbers that are computed on at once, by C's own operators; a number beside them
+ * stands for four. A processor without registers this wide computes them in parts, in the same order of operations and so to the same bits. */
 #ifndef TG_LANES_H
 #define TG_LANES_H
 #include "terragrip.h"
@@ -46,19 +46,8 @@
 typedef tg_real tg_lanes __attribute__((vector_size(TG_LANES * sizeof(tg_real))));
 
 TG_INLINE tg_lanes lanes_all(tg_real x) { return (tg_lanes){x, x, x, x}; }
-TG_INLINE tg_lanes lanes_add(tg_lanes a, tg_lanes b) { return a + b; }
-TG_INLINE tg_lanes lanes_sub(tg_lanes a, tg_lanes b) { return a - b; }
-TG_INLINE tg_lanes lanes_mul(tg_lanes a, tg_lanes b) { return a * b; }
-TG_INLINE tg_lanes lanes_div(tg_lanes a, tg_lanes b) { return a / b; }
-TG_INLINE tg_lanes lanes_mul_add(tg_lanes a, tg_lanes b, tg_lanes c) { return c + a * b; }
-TG_INLINE tg_lanes lanes_mul_sub(tg_lanes a, tg_lanes b, tg_lanes c) { return c - a * b; }
 TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a[i]; }
-TG_INLINE tg_lanes lanes_spread(tg_lanes a, int i) { return lanes_all(lanes_at(a, i)); }
-
-TG_INLINE tg_lanes lanes_of(tg_real a, tg_real b, tg_real c, tg_real d)
-{
-    return (tg_lanes){a, b, c, d};
-}
+TG_INLINE tg_lanes lanes_of(tg_real a, tg_real b, tg_real c, tg_real d) { return (tg_lanes){a, b, c, d}; }
 TG_INLINE tg_lanes lanes_load(const tg_real *p)
 {
     tg_lanes a;
@@ -66,8 +55,5 @@ TG_INLINE tg_lanes lanes_load(const tg_real *p)
     return a;
 }
 TG_INLINE void lanes_store(tg_real *p, tg_lanes a) { memcpy(p, &a, sizeof a); }
-TG_INLINE tg_real lanes_sum(tg_lanes a)
-{
-    return (lanes_at(a, 0) + lanes_at(a, 1)) + (lanes_at(a, 2) + lanes_at(a, 3));
-}
+TG_INLINE tg_real lanes_sum(tg_lanes a) { return (a[0] + a[1]) + (a[2] + a[3]); }
 #endif

@@ -17,13 +17,13 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED],
         tg_lanes mm = none, mr = none, vm = none, wm = none, wr = none, wv = none, ww = none;
         for (int k = 0; k < columns; k += TG_LANES) {
             const tg_lanes sm = lanes_load(S[i] + k), sw = lanes_load(S[w + i] + k), sr = lanes_load(S[r] + k), sv = lanes_load(S[v] + k);
-            mm = lanes_mul_add(sm, sm, mm);
-            mr = lanes_mul_add(sm, sr, mr);
-            vm = lanes_mul_add(sm, sv, vm);
-            wm = lanes_mul_add(sm, sw, wm);
-            wr = lanes_mul_add(sw, sr, wr);
-            wv = lanes_mul_add(sw, sv, wv);
-            ww = lanes_mul_add(sw, sw, ww);
+            mm += sm * sm;
+            mr += sm * sr;
+            vm += sm * sv;
+            wm += sm * sw;
+            wr += sw * sr;
+            wv += sw * sv;
+            ww += sw * sw;
         }
         c->mm[i] = P[i * stride + i] + lanes_sum(mm);
         c->mr[i] = Pr[i] + lanes_sum(mr);
@@ -35,9 +35,9 @@ TG_INLINE void gather(const tg_belief *b, const tg_real (*S)[TG_MAX_CONSIDERED],
     }
     for (int k = 0; k < columns; k += TG_LANES) {
         const tg_lanes sr = lanes_load(S[r] + k), sv = lanes_load(S[v] + k);
-        rr = lanes_mul_add(sr, sr, rr);
-        vr = lanes_mul_add(sv, sr, vr);
-        vv = lanes_mul_add(sv, sv, vv);
+        rr += sr * sr;
+        vr += sv * sr;
+        vv += sv * sv;
     }
     c->rr = Pr[r] + lanes_sum(rr);
     c->vr = Pv[r] + lanes_sum(vr);

@@ -30,10 +30,10 @@ TG_INLINE void draw(const weights *w, const tg_real *x, const tg_real *u, const 
     for (int i = 0; i < lanes; i++) lanes_store(points + TG_LANES * i, lanes_load(x + TG_LANES * i));
     for (int k = 0; k < rows; k++)
         for (int i = 0; i < lanes; i++) {
-            const tg_lanes away = lanes_mul(lanes_all(reach[k]), lanes_load(u + k * from + TG_LANES * i));
+            const tg_lanes away = reach[k] * lanes_load(u + k * from + TG_LANES * i);
             const tg_lanes centre = lanes_load(x + TG_LANES * i);
-            lanes_store(points + (1 + 2 * k) * stride + TG_LANES * i, lanes_add(centre, away));
-            lanes_store(points + (2 + 2 * k) * stride + TG_LANES * i, lanes_sub(centre, away));
+            lanes_store(points + (1 + 2 * k) * stride + TG_LANES * i, centre + away);
+            lanes_store(points + (2 + 2 * k) * stride + TG_LANES * i, centre - away);
         }
 }
 
@@ -44,12 +44,12 @@ TG_INLINE void centre(const weights *w, tg_real *points, tg_real *mean, int stri
     for (int i = 0; i < stride; i += TG_LANES) {
         tg_lanes plus = lanes_all(0), minus = lanes_all(0);
         for (int k = 1; k < count; k += 2) {
-            plus = lanes_add(plus, lanes_load(points + k * stride + i));
-            minus = lanes_add(minus, lanes_load(points + (k + 1) * stride + i));
+            plus += lanes_load(points + k * stride + i);
+            minus += lanes_load(points + (k + 1) * stride + i);
         }
-        const tg_lanes m = lanes_mul_add(lanes_all(w->mean), lanes_load(points + i), lanes_mul(lanes_all(w->other), lanes_add(plus, minus)));
+        const tg_lanes m = w->other * (plus + minus) + w->mean * lanes_load(points + i);
         lanes_store(mean + i, m);
-        for (int k = 0; k < count; k++) lanes_store(points + k * stride + i, lanes_sub(lanes_load(points + k * stride + i), m));
+        for (int k = 0; k < count; k++) lanes_store(points + k * stride + i, lanes_load(points + k * stride + i) - m);
     }
 }
 

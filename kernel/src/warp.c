@@ -79,8 +79,8 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
 {
     tg_lanes first = lanes_all(0), last = first;
     for (int j = 0; j < TG_MAX_WHEELS; j++) {
-        first = lanes_mul_add(lanes_load(c->beyond[j]), lanes_all(value[j]), first);
-        last = lanes_mul_add(lanes_load(c->beyond[j] + TG_LANES), lanes_all(value[j]), last);
+        first += lanes_load(c->beyond[j]) * value[j];
+        last += lanes_load(c->beyond[j] + TG_LANES) * value[j];
     }
     lanes_store(warp, first);
     lanes_store(warp + TG_LANES, last);
