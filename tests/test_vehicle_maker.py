@@ -230,6 +230,8 @@ def test_where_torques_are_measured_decides_on_bearings_and_the_gear_ratio(
     unsaid, wheel, motor = (make("six-wheel", "torque", known, torque_at=at) for at in ("", "wheel", "motor"))
     assert wheel.vehicle.bearing_resistance == 0
     assert motor.vehicle.bearing_resistance == unsaid.vehicle.bearing_resistance > 0
+    free, driven = np.unique(make("tractor-2wd", "torque", known).vehicle.wheel_bearing)
+    assert free == 0 < driven, "it is of the geared drive"
     assert (
         wheel.vehicle.uncertainty.tire_rolling_resistance < motor.vehicle.uncertainty.tire_rolling_resistance
     )

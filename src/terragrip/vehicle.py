@@ -209,6 +209,12 @@ class Vehicle(Part):
         return _frozen(np.array([wheel.inertia for wheel in self.wheel_data]))
 
     @cached_property
+    def wheel_bearing(self) -> Floats:
+        """Bearing resistance of each wheel (n,) [N s/rad]: its axle's, else the vehicle's."""
+        own = [axle.bearing_resistance for axle in self.axles.values() for _ in axle.wheels]
+        return _frozen(np.array([self.bearing_resistance if one is None else one for one in own]))
+
+    @cached_property
     def driven(self) -> Bools:
         """Whether each wheel is driven (n,)."""
         return _frozen(np.array([axle.driven for axle in self.axles.values() for _ in axle.wheels]))

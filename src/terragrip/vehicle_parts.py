@@ -155,13 +155,17 @@ class Wheel(Part):
 
 
 class Axle(Part):
-    """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers."""
+    """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers.
+
+    ``bearing_resistance`` [N s/rad]: of each of its wheels, where it is another than the vehicle's.
+    """
 
     mass: Mass
     wheels: tuple[str, ...]
     wheel: Wheel | None = None
     driven: bool = True
     steered: bool = False
+    bearing_resistance: Bearing | None = None
 
     @field_validator("wheels", mode="before")
     @classmethod

@@ -78,7 +78,7 @@ def test_mass_balance_energy_and_friction_are_those_of_all_wheels(driven: tuple[
         energy = np.sum(whole.wheel_inertia[wheels] / whole.wheel_radius[wheels] ** 2)
         assert one.wheel_inertia[k] / one.wheel_radius[k] ** 2 == pytest.approx(energy)
         assert bool(one.driven[k]) == (name == DRIVEN)
-    assert one.bearing_resistance == pytest.approx(3.0 * 2 * sum(driven))
+        assert one.wheel_bearing[k] == pytest.approx(3.0 * wheels.sum())
 
 
 def test_what_speaks_of_single_torques_is_left_out_and_the_driveline_is_in_the_common_gain() -> None:

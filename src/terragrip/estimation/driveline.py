@@ -260,19 +260,14 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
         inertia = float(np.sum(vehicle.wheel_inertia[wheels] * (radius / radii[wheels]) ** 2))
         place = float(np.average(position[axles], weights=mass[axles]))
         wheel = {"radius": radius, "inertia": inertia}
-        groups.append(
-            (
-                place,
-                name,
-                {"mass": float(mass[axles].sum()), "wheels": [name], "wheel": wheel, "driven": chosen},
-            )
-        )
+        axle = {"mass": float(mass[axles].sum()), "wheels": [name], "wheel": wheel, "driven": chosen}
+        axle["bearing_resistance"] = float(vehicle.wheel_bearing[wheels].sum())
+        groups.append((place, name, axle))
     groups.sort(key=lambda group: -group[0])
     rear = groups[-1][0]
     calibration = data.get("calibration", {})
     data |= {
         "axles": {name: axle for _, name, axle in groups},
-        "bearing_resistance": vehicle.bearing_resistance * int(vehicle.driven.sum()),
         "hitch_overhang": vehicle.hitch_overhang + rear,
         "hitch_height": vehicle.hitch_height,
         "center_of_gravity_height": vehicle.center_of_gravity_height,

@@ -124,7 +124,7 @@ def _set_wheels(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> N
         machine.radius[i] = arms[i]
         settings.rolling_radius[i] = rolling[i]
         machine.inertia[i] = vehicle.wheel_inertia[i]
-        machine.bearing_resistance[i] = vehicle.bearing_resistance
+        machine.bearing_resistance[i] = vehicle.wheel_bearing[i]
         settings.wheel_axle[i] = vehicle.wheel_axle[i]
         settings.powered[i] = bool(vehicle.driven[i])
         settings.driven[i] = bool(vehicle.driven[i]) or f"drive_torque_{wheel}" in channels

@@ -169,7 +169,7 @@ def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: F
         machine.command_ratio[i] = float(vehicle.wheel_radius[0] / vehicle.wheel_radius[i])
         machine.radius[i] = float(radius[i])
         machine.inertia[i] = float(vehicle.wheel_inertia[i])
-        machine.bearing[i] = vehicle.bearing_resistance
+        machine.bearing[i] = vehicle.wheel_bearing[i]
         machine.driven[i] = int(vehicle.driven[i])
     for name in (
         "tire_stiffness", "tire_damping", "resistance_length", "load_softening", "slip_speed", "wheel_rest_speed", "speed_gain",

@@ -97,7 +97,7 @@ def _wheels(
     radius, driven = vehicle.wheel_radius, vehicle.driven
     moves = (ground > 0).astype(float)
     drag = moves[:, None] * (
-        vehicle.tire_rolling_resistance * load + vehicle.bearing_resistance * ground[:, None] / radius
+        vehicle.tire_rolling_resistance * load + vehicle.wheel_bearing * ground[:, None] / radius
     )
     spin = vehicle.wheel_inertia * push[:, None] / radius
     free = np.where(driven, 0.0, -(drag + spin / radius))  # force of a wheel that no torque turns

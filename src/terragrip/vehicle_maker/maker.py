@@ -123,10 +123,9 @@ def vehicle_of(
     values = {field: spec.value for field, spec in typical.items()} | dict(known)
     tree = _tree(machine, values, name)
     if signals == "bus-speed":
-        for axle in (tree, *tree["axles"].values()):
-            axle.pop("wheel", None)
-        for key in ("tire_rolling_resistance", "bearing_resistance"):
-            tree.pop(key, None)
+        for part in (tree, *tree["axles"].values()):
+            for key in ("wheel", "tire_rolling_resistance", "bearing_resistance"):
+                part.pop(key, None)
         return Vehicle.from_dict(tree)
     spread = {field: typical[field].spread for field in doubted if field in typical}
     considered = _considered(Vehicle.from_dict(tree), machine, values, spread)
@@ -169,6 +168,8 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
     for (key, own), load in zip(machine.axles.items(), masses, strict=True):
         axles[key] = {"mass": load, "wheels": list(own["wheels"])}
         axles[key] |= {name: own[name] for name in ("driven", "steered") if name in own}
+        if not own.get("driven", True) and values["bearing_resistance"]:
+            axles[key]["bearing_resistance"] = 0.0  # it is of the geared drive, which a free wheel has not
     inertia = values["wheel_inertia"]
     tree: dict[str, Any] = {"name": name or machine.title, "mass": _digits(sum(masses))}
     for key in ("wheelbase", "track", "center_of_gravity_height", "hitch_height"):

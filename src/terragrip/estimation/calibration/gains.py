@@ -217,7 +217,7 @@ def _rows(
 ) -> Sharing:
     radius = vehicle.wheel_radius
     spin = vehicle.wheel_inertia * table.wheel_acceleration
-    rolling = vehicle.tire_rolling_resistance * table.load + vehicle.bearing_resistance * table.wheel_speed
+    rolling = vehicle.tire_rolling_resistance * table.load + vehicle.wheel_bearing * table.wheel_speed
     return Sharing(
         torque=table.torque[:, driven],
         known=(spin + radius * rolling)[:, driven],

@@ -152,7 +152,7 @@ def _adhesion(windows: Windows, vehicle: Vehicle) -> Floats:
         radius=vehicle.wheel_radius,
         inertia=vehicle.wheel_inertia,
         tire_resistance=vehicle.tire_rolling_resistance,
-        bearing_resistance=vehicle.bearing_resistance,
+        bearing_resistance=vehicle.wheel_bearing,
     )
     driven = vehicle.driven
     if driven.any():

@@ -179,7 +179,7 @@ def _balance(table: Windows, vehicle: Vehicle) -> _Balance:
     thrust = np.sum(table.torque / radius, axis=1)
     inertia = np.sum(vehicle.wheel_inertia * table.wheel_acceleration / radius, axis=1)
     rolling = vehicle.tire_rolling_resistance * table.load * way[:, None]
-    losses = inertia + np.sum(rolling + vehicle.bearing_resistance * table.wheel_speed, axis=1)
+    losses = inertia + np.sum(rolling + vehicle.wheel_bearing * table.wheel_speed, axis=1)
     kinematic = table.kinematic_push
     measured = np.isfinite(table.acceleration) & np.isfinite(table.pitch) & np.isfinite(kinematic)
     first = table.drawbar + vehicle.mass * table.push
