@@ -14,6 +14,7 @@ import pytest
 from terragrip.cli import main
 from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
+from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.vehicle import Vehicle
 
 ROWS = 3000
@@ -331,7 +332,7 @@ def test_what_a_log_contradicted_is_said_of_its_soils(
 ) -> None:
     """It stood in the estimates' summary alone, which nobody sees of a batch."""
     note = "drive_torque_fl (0) never changes while the vehicle drives: the sensor is dead, or the column is wrong."
-    usual = "There is no drawbar_force: the vehicle is assumed to tow nothing."
+    usual = NOTHING_TOWED
     paths = [tmp_path / f"run{k}.parquet" for k in range(7)]
     for k, path in enumerate(paths):
         replace(estimates(k), notes=(usual, note) if k else (usual,)).write(path)

@@ -56,7 +56,9 @@ def test_the_summary_of_an_estimate_names_pages(tmp_path: Path, capsys: pytest.C
     log, vehicle = str(tmp_path / "log.csv"), str(tmp_path / "v.yaml")
     assert main(["estimate", log, "--vehicle", vehicle, "-o", str(tmp_path / "e.parquet")]) == 0
     notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Note: ")]
-    assert any(line.endswith("to tow nothing. (docs: vehicle#signals-that-are-missing)") for line in notes)
+    assert any(
+        line.endswith("if nothing is towed. (docs: vehicle#signals-that-are-missing)") for line in notes
+    )
     assert any("extra" in line and line.endswith("(docs: formats#in-a-profile)") for line in notes)
 
 

@@ -104,8 +104,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
         k++;
     }
     if (spread->drawbar_gain > 0 || spread->drawbar_offset > 0) {
-        const int32_t measured = s->towing || e->drawbar.count > 0; /* without a cell nothing is towed */
-        const tg_real variance = measured ? tgi_square(spread->drawbar_gain * u->drawbar) + tgi_square(spread->drawbar_offset) : 0;
+        const tg_real variance = tgi_square(spread->drawbar_gain * u->drawbar) + tgi_square(spread->drawbar_offset);
         d->acceleration[k] = d->accelerometer[k] = -tgi_sqrt(variance) * inverse_mass;
         k++;
     }

@@ -73,7 +73,6 @@ PAGES = (
     ("too short to determine the zero-slip radius", "formats#a-stock-tractor-slip-from-its-bus"),
     ("The rims read 0 in", "formats#a-stock-tractor-slip-from-its-bus"),
     ("is the engine's through the driveline", "vehicle#engine-torque-in-place-of-wheel-torques"),
-    ("the pull of a tool is part of soil_resistance", "vehicle#engine-torque-in-place-of-wheel-torques"),
     ("The engine's own friction is not in the log", "vehicle#engine-torque-in-place-of-wheel-torques"),
     ("frames are in no DBC or table", "formats#can-logs"),
     ("of the DBC's messages occurs in the log", "formats#can-logs"),

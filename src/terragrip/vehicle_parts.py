@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, PlainSerializer, field_validator, model_validator
@@ -245,6 +245,7 @@ class Uncertainty(Part):
     drive_torque_offset: _Torque | None = None
     drawbar_gain: _Ratio | None = None
     drawbar_offset: _Force | None = None
+    drawbar_force: _Force | None = None  # of a pull that no cell measures
     slope: _Angle | None = None
     wheel_radius: _Ratio | None = None
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.15)] | None = (
@@ -255,6 +256,10 @@ class Uncertainty(Part):
     hitch_load_gain: _Ratio | None = None
     hitch_load_offset: _Force | None = None
     acceleration_bias: _Acceleration | None = None
+
+    def of_pull(self, channels: Collection[str]) -> float:
+        """SD [N] of a lasting error of the pull: of the cell's zero where ``channels`` have a drawbar force, else of the pull itself."""
+        return (self.drawbar_offset if "drawbar_force" in channels else self.drawbar_force) or 0.0
 
 
 class Calibration(Part):

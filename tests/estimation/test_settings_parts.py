@@ -10,12 +10,12 @@ from terragrip.estimation.settings import _SENSED_SLOPE, _set_uncertainty
 
 
 @pytest.mark.parametrize(
-    ("stated", "pitch_measured", "slope"),
-    [(0.1, False, 0.1), (0.1, True, _SENSED_SLOPE), (_SENSED_SLOPE / 2, True, _SENSED_SLOPE / 2)],
+    ("stated", "channels", "slope"),
+    [(0.1, (), 0.1), (0.1, ("pitch",), _SENSED_SLOPE), (_SENSED_SLOPE / 2, ("pitch",), _SENSED_SLOPE / 2)],
 )
 def test_a_measured_pitch_leaves_its_mounting_unknown_alone(
-    stated: float, pitch_measured: bool, slope: float
+    stated: float, channels: tuple[str, ...], slope: float
 ) -> None:
     settings = ffi.new("tg_settings *")
-    _set_uncertainty(settings, robot(uncertainty={"slope": stated}), pitch_measured)
+    _set_uncertainty(settings, robot(uncertainty={"slope": stated}), channels)
     assert settings.uncertainty.slope == pytest.approx(slope)

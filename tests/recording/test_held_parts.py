@@ -7,7 +7,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording, held_periods, sensor_noise
-from terragrip.recording.checks import check_time, refuse_other_mass, remarks, require_columns
+from terragrip.recording.checks import NOTHING_TOWED, check_time, refuse_other_mass, remarks, require_columns
 from terragrip.recording.held import fresh_samples, held_period, measured_part, quantum
 from terragrip.recording.noise import white_noise
 from terragrip.vehicle import Vehicle
@@ -204,4 +204,4 @@ def test_what_is_missing_and_what_is_not_used_is_said() -> None:
         f"Columns that are not used: {', '.join(names)}."
     ]
     assert remarks(("drawbar_force", *names, "y", "z"))[0].endswith("x7 and 2 more.")
-    assert remarks(("time",)) == ["There is no drawbar_force: the vehicle is assumed to tow nothing."]
+    assert remarks(("time",)) == [NOTHING_TOWED]

@@ -55,8 +55,7 @@ class ByEngine:
             notes = (
                 note.replace(_ITS_ZERO, _TAKEN) if note.startswith(_LEAPS) else note
                 for note in part.notes
-                if not note.startswith("There is no drawbar_force")
-                and not (self.machine.unknown_pto and note.startswith(_LEAPS))
+                if not (self.machine.unknown_pto and note.startswith(_LEAPS))
             )
             yield replace(
                 part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes)))

@@ -41,10 +41,6 @@ _PTO = (
     "The PTO turns in {:.0%} of the log. What it takes of the engine's torque is not known, so these rows hold no adhesion and no soil "
     "resistance: give 'pto_power: 40 kW' (and pto_power_std) under 'driveline'."
 )
-_TOWING = (
-    "There is no drawbar_force: the pull of a tool is part of soil_resistance, "
-    "so net traction and efficiency are those without a tool."
-)
 
 
 def by_engine(channels: Collection[str], vehicle: Vehicle) -> bool:
@@ -147,7 +143,7 @@ class DrivenMachine:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the user."""
-        return (_NOTE, *self.engine.notes, *(() if "drawbar_force" in self.channels else (_TOWING,)))
+        return (_NOTE, *self.engine.notes)
 
     def _speed(self, channels: Mapping[str, Floats], wheels: tuple[str, ...], radius: float) -> Floats:
         """Mean speed (n,) [rad/s] of some wheels as one of a ``radius``."""

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from terragrip.recording import unit_warnings
+from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, .
     if guessed:
         shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
         notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    if estimator.slip_reference is not None or estimator.vehicle.uncertainty.drawbar_force is not None:
+        notes = [note for note in notes if note != NOTHING_TOWED]
     if estimator.slip_reference is not None:
-        notes = [note for note in notes if not note.startswith("There is no drawbar_force")]
         notes += estimator.slip_reference.notes
     return tuple(dict.fromkeys(notes))

@@ -104,7 +104,7 @@ def settings_of(
     lib.tg_tune_walks(settings)
     _set_loads(settings, vehicle)
     _set_calibration(settings, vehicle)
-    _set_uncertainty(settings, vehicle, "pitch" in channels)
+    _set_uncertainty(settings, vehicle, channels)
     for name, slot in sample_slots(vehicle).items():
         settings.noise[slot] = noise.get(name, 0.0)
         settings.held_period[slot] = held.get(name, 0.0)
@@ -204,11 +204,13 @@ def _set_calibration(settings: Any, vehicle: Vehicle) -> None:
 _SENSED_SLOPE = np.deg2rad(0.2)  # SD of a pitch sensor's mounting, if the vehicle file has none
 
 
-def _set_uncertainty(settings: Any, vehicle: Vehicle, pitch_measured: bool) -> None:
-    """The vehicle file's spreads. A measured pitch leaves only its mounting unknown, not the slope."""
+def _set_uncertainty(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> None:
+    """The vehicle file's spreads. A measured pitch leaves only its mounting unknown, not the slope; without a cell the pull itself is
+    unknown, not a cell's zero."""
     given = vehicle.uncertainty
     spread = settings.uncertainty
     for name, _ in ffi.typeof("tg_uncertainty").fields:
         setattr(spread, name, getattr(given, name) or 0.0)
-    if pitch_measured and given.slope is not None:
+    spread.drawbar_offset = given.of_pull(channels)
+    if "pitch" in channels and given.slope is not None:
         spread.slope = min(given.slope, _SENSED_SLOPE)

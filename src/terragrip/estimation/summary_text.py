@@ -20,7 +20,6 @@ Columns = dict[str, npt.NDArray[Any]]
 
 _EXPECTED = (0.7, 1.4)  # of the normalised innovation squared a channel
 _MOST_LABELS = 8  # rows of the table
-_SHOWN = ("slip", "adhesion", "efficiency")
 _DOUBTFUL = (
     "check ",
     "Check ",
@@ -77,7 +76,9 @@ def _events(tally: Tally) -> str:
 
 def _by_label(tally: Tally, columns: Columns) -> list[str]:
     """A table: a row a label (at most some, the longest driven), a column a quantity, the mean over the driven wheels."""
-    shown = [name for name in ("ground_speed", *_SHOWN, "soil_resistance") if _names(tally, name, columns)]
+    shown = [
+        name for name in ("ground_speed", *_by_each(tally), "soil_resistance") if _names(tally, name, columns)
+    ]
     labels = sorted((name for name in tally.moving if name), key=lambda name: -tally.moving[name])
     rows = [("all", np.ones(len(columns["label"]), dtype=bool), sum(tally.moving.values()))]
     if len(labels) == 1 and not tally.moving.get(""):
@@ -107,13 +108,28 @@ def _by_wheel(tally: Tally, columns: Columns) -> list[str]:
         return []
     lines = ["  " + "by wheel".ljust(12) + "".join(wheel.rjust(17) for wheel in tally.wheels)]
     every = np.ones(len(columns["label"]), dtype=bool)
-    for quantity in _SHOWN:
+    for quantity in _by_each(tally):
         if f"{quantity}_{tally.wheels[0]}" in columns:
             cells = "".join(
                 _mean_cell(columns, [f"{quantity}_{wheel}"], every).rjust(17) for wheel in tally.wheels
             )
             lines.append("  " + quantity.ljust(12) + cells)
     return lines
+
+
+def _by_each(tally: Tally) -> tuple[str, ...]:
+    """What is shown of each wheel: an efficiency where the pull is measured, or the vehicle file says how large it may be."""
+    stated = _uncertainty(tally).get("drawbar_force") is not None
+    return ("slip", "adhesion", "efficiency") if stated or _has_cell(tally) else ("slip", "adhesion")
+
+
+def _uncertainty(tally: Tally) -> dict[str, float | None]:
+    return tally.about.get("vehicle", {}).get("uncertainty") or {}
+
+
+def _has_cell(tally: Tally) -> bool:
+    """Whether a drawbar force is in the log; True where the estimates do not say what is."""
+    return "drawbar_force" in tally.about.get("settings", {}).get("channels", ("drawbar_force",))
 
 
 def _names(tally: Tally, quantity: str, columns: Columns) -> list[str]:
@@ -126,13 +142,14 @@ def _names(tally: Tally, quantity: str, columns: Columns) -> list[str]:
 
 
 def _mean_cell(columns: Columns, names: list[str], chosen: npt.NDArray[np.bool_]) -> str:
-    """Mean over columns of their medians and of their median standard deviations, over the chosen rows; an efficiency only where known."""
+    """Mean over columns of their medians and of their median standard deviations, over the chosen rows; an efficiency only where its
+    interval does not hold all that it can be."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a column may be all NaN, or no row chosen
         value = np.mean([np.nanmedian(columns[name][chosen]) for name in names])
         spread = np.mean([np.nanmedian(columns[f"{name}_std"][chosen]) for name in names])
     if names[0].startswith("efficiency_") and NORMAL_95 * spread > 0.5:
-        return "not known"  # the interval holds all that an efficiency can be
+        return "not known"
     return f"{value:.3f} ± {NORMAL_95 * spread:.3f}" if np.isfinite(value) else "-"
 
 
@@ -150,7 +167,8 @@ def _consistency(tally: Tally) -> list[str]:
 def _assumed(tally: Tally) -> list[str]:
     """What the estimates rest on that the log does not show."""
     vehicle, assumptions = tally.about.get("vehicle", {}), []
-    given = {name: value for name, value in (vehicle.get("uncertainty") or {}).items() if value}
+    other = ("drawbar_force",) if _has_cell(tally) else ("drawbar_gain", "drawbar_offset")
+    given = {name: value for name, value in _uncertainty(tally).items() if value and name not in other}
     if given:
         assumptions.append(
             "considered as unknown "
@@ -178,6 +196,7 @@ def _short(name: str, value: float) -> str:
     unit = {
         "drive_torque_offset": " N m",
         "drawbar_offset": " N",
+        "drawbar_force": " N",
         "hitch_load_offset": " N",
         "acceleration_bias": " m/s²",
         "tire_rolling_resistance": "",

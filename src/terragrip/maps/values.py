@@ -190,9 +190,9 @@ def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Float
     offset = (
         (known.drive_torque_offset or 0.0) * np.sqrt(driven) / (float(vehicle.wheel_radius.mean()) * weight)
     )
-    force = (known.drawbar_offset or 0.0) / weight
     slope, unmeasured = known.slope or 0.0, 0.0
-    channels = estimates.about.get("settings", {}).get("channels", ("acceleration_x",))
+    channels = estimates.about.get("settings", {}).get("channels", ("acceleration_x", "drawbar_force"))
+    force = known.of_pull(channels) / weight
     if (
         "acceleration_x" in channels and known.acceleration_bias is not None
     ):  # it measures slope and acceleration together

@@ -122,6 +122,13 @@ def how_to_pivot(columns: Collection[str]) -> str | None:
     )
 
 
+NOTHING_TOWED = (
+    "There is no drawbar_force: the vehicle is assumed to tow nothing. If it does, soil_resistance contains the pull, and net traction and "
+    "efficiency are too small: write how large the pull may be as 'uncertainty: {drawbar_force: 3 kN}' in the vehicle file, or 0 if "
+    "nothing is towed."
+)
+
+
 def remarks(columns: Collection[str]) -> list[str]:
     """Sentences on uses for which the columns of a table are not enough."""
     notes = []
@@ -130,7 +137,7 @@ def remarks(columns: Collection[str]) -> list[str]:
         more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
         notes.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
     if "drawbar_force" not in columns:
-        notes.append("There is no drawbar_force: the vehicle is assumed to tow nothing.")
+        notes.append(NOTHING_TOWED)
     return notes
 
 

@@ -72,7 +72,7 @@ class MachineClass:
             return _relative(own, mass / wheels * float(np.cbrt(mass / 139)) ** 0.5)
         if name == "drive_torque_offset":
             return Typical(own["value"] * load * float(radius or 0), 0.0, own["source"])
-        if name == "drawbar_offset":
+        if name in ("drawbar_offset", "drawbar_force"):
             return Typical(own["value"] * mass * 9.80665, 0.0, own["source"])
         return Typical(own["value"], own.get("spread", 0.0), own["source"])
 

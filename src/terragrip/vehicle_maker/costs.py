@@ -13,7 +13,10 @@ from terragrip.vehicle_maker.drive import drive
 from terragrip.vehicle_maker.fields import fields
 from terragrip.vehicle_maker.maker import Made, vehicle_of
 
-_UNSEEN = "acceleration_bias"  # of a sensor that the machine on paper does not have
+_UNSEEN = (
+    "acceleration_bias",
+    "drawbar_force",
+)  # of what the machine on paper does not have: an accelerometer, a pull without a cell
 QUANTITIES = ("slip", "adhesion", "soil_resistance", "net_traction")
 
 
@@ -35,7 +38,7 @@ def interval_costs(made: Made) -> tuple[Cost, ...]:
     """
     if made.signals == "bus-speed":
         return _bus_costs(made)
-    asked = [one for one in fields(made.machine, made.signals, made.known) if one.name != _UNSEEN]
+    asked = [one for one in fields(made.machine, made.signals, made.known) if one.name not in _UNSEEN]
     true = vehicle_of(made.machine, "torque", made.known, ())
     recording = drive(true, made.machine.speed, made.signals, tows=made.machine.tows)
     spreads = {field.name for field in asked if field.is_spread}
@@ -49,7 +52,7 @@ def interval_costs(made: Made) -> tuple[Cost, ...]:
     alone = [
         Cost(field.assumption, field.name, widths([field.name], numbers))
         for field in made.assumed
-        if field.name != _UNSEEN
+        if field.name not in _UNSEEN
     ]
     alone += [
         Cost(

@@ -79,6 +79,7 @@ _SPREADS: tuple[tuple[str, str, str], ...] = (
     ("drive_torque_gain", "error of the torques' scale, standard deviation", "1"),
     ("drive_torque_offset", "error of the torques' zero, standard deviation", "N m"),
     ("drawbar_offset", "error of the drawbar force's zero, standard deviation", "N"),
+    ("drawbar_force", "pull of a tool where no drawbar force is measured, standard deviation", "N"),
     ("slope", "slope of the ground where no pitch is measured, standard deviation", "rad"),
     ("acceleration_bias", "error of an accelerometer's zero, mounting included, standard deviation", "m/s^2"),
 )
@@ -110,7 +111,7 @@ def fields(
         if machine.carries:
             found += [Field(name, title, unit, None) for name, title, unit in _PAYLOAD]
         for name, title, unit in _SPREADS:
-            if name == "drawbar_offset" and not machine.tows:
+            if name in ("drawbar_offset", "drawbar_force") and not machine.tows:
                 continue
             found.append(Field(name, title, unit, machine.typical(name, mass, radius), is_spread=True))
     return tuple(found)

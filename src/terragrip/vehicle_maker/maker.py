@@ -135,7 +135,9 @@ def vehicle_of(
             "wheel_radius": RADIUS_BY_TAPE,
             "drive_torque_gain_common": float(np.hypot(scale, RADIUS_BY_TAPE)),
         }
-    for field in ("drive_torque_gain", "drive_torque_offset", "drawbar_offset", "slope", "acceleration_bias"):
+    for field in (
+        "drive_torque_gain", "drive_torque_offset", "drawbar_offset", "drawbar_force", "slope", "acceleration_bias",
+    ):  # fmt: skip
         share = (
             known.get(field, typical[field].value if field in doubted else 0.0) if field in typical else 0.0
         )
@@ -146,6 +148,8 @@ def vehicle_of(
     tree["uncertainty"] = {
         key: _digits(value) for key, value in considered.items() if value or key == "wheel_radius"
     }
+    if signals == "torque" and not machine.tows:
+        tree["uncertainty"]["drawbar_force"] = 0.0
     return Vehicle.from_dict(tree)
 
 
