@@ -181,6 +181,27 @@ def test_rims_that_read_0_at_a_driving_speed_are_no_dead_band() -> None:
     assert "cannot measure less" not in notes
 
 
+def test_an_engines_torque_that_is_not_used_is_named() -> None:
+    """The summary said that adhesion needs a torque; the log had the engine's."""
+    log = speeds_of(0.1)
+    engine = {"engine_speed": np.full(len(log), 150.0), "engine_torque": np.full(len(log), 50.0)}
+    assert any("'driveline'" in note for note in tg.estimate(log.with_channels(**engine), robot()).notes)
+    assert not any("'driveline'" in note for note in tg.estimate(log, robot()).notes)
+
+
+def test_the_slip_of_free_wheels_is_none() -> None:
+    """A tricycle whose driven front wheel the profile lacked was estimated by its two rear wheels: slip -.005, 'of the driven wheels'."""
+    data = robot().to_dict()
+    data["axles"]["front"]["driven"] = True
+    data["axles"]["rear"]["driven"] = False
+    log = speeds_of(0.1)
+    kept = {n: v for n, v in log.channels.items() if n not in ("wheel_speed_fl", "wheel_speed_fr")}
+    with pytest.raises(
+        InputError, match="column wheel_speed_fl: is missing: the log has speeds of free wheels alone"
+    ):
+        tg.estimate(tg.Recording(log.time, kept), tg.Vehicle.from_dict(data))
+
+
 def test_some_torques_missing_is_an_error_not_slip() -> None:
     log = speeds_of(0.1)
     with pytest.raises(InputError, match="drive_torque_fr: is missing, but the wheel fr is driven"):

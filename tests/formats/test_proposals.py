@@ -19,6 +19,7 @@ from terragrip.formats import inspect, read
 from terragrip.formats.proposal import missing_channels
 from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
+from terragrip.vehicle import Vehicle
 from terragrip.vehicle_maker import make
 
 TIME = np.arange(0.0, 60.0, 0.1)
@@ -184,6 +185,25 @@ def test_the_torque_of_an_axle_is_no_wheels_and_comes_with_its_line(name: str, e
     result = _propose({"speed_mps": SPEED, name: 100 + SPEED})
     assert not any(channel.startswith("drive_torque") for channel in result)
     assert any(entry in note for note in result.left_out)
+
+
+def test_an_axle_with_one_wheel_is_that_wheel() -> None:
+    """A tricycle's driven front wheel was left out, and its torque said to be shared evenly by a differential."""
+    rear = {"mass": 150, "wheels": ["rl", "rr"], "driven": False}
+    tricycle = Vehicle.from_dict(
+        {
+            "mass": 250,
+            "wheelbase": 1.2,
+            "center_of_gravity_height": 0.4,
+            "axles": {"front": {"mass": 100, "wheels": ["f"], "steered": True}, "rear": rear},
+            "wheel": {"radius": 0.2, "inertia": 0.1},
+        }
+    )
+    names = {"v_gps_mps": SPEED, "front_wheel_rpm": 48 * SPEED, "front wheel torque [Nm]": 30 + SPEED}
+    result = propose(names, (), {}, dict.fromkeys(names, TIME), vehicle=tricycle)
+    assert result["wheel_speed_f"].columns == ("front_wheel_rpm",)
+    assert result["drive_torque_f"].columns == ("front wheel torque [Nm]",)
+    assert result.left_out == ()
 
 
 def test_axles_are_counted_from_the_first_number_in_the_log() -> None:

@@ -47,7 +47,7 @@ def vehicle(
         str | None,
         typer.Option(
             metavar="WHAT",
-            help="What its log contains: torque (default), wheel-speeds or bus-speed (docs/vehicle.md).",
+            help="What its log contains: torque (default; of the engine, too), wheel-speeds or bus-speed (docs/vehicle.md).",
         ),
     ] = None,
     torque_at: Annotated[
@@ -296,7 +296,9 @@ def _said(made: Made) -> str:
         lines.append(f"Find out first: {', '.join(lacking)}. Then 'terragrip calibrate' on a log.")
     elif made.signals == "bus-speed":
         lines.append(
-            "Next: estimate a log that contains 40 s without load (headland, road), or calibrate on one."
+            "Next: estimate a log that contains 40 s without load (headland, road), or calibrate on one.\n"
+            "If the bus has the engine's torque: make the file with --torque-at wheel in place of --signals, and add a 'driveline' "
+            "(docs: vehicle#engine-torque-in-place-of-wheel-torques)."
         )
     else:
         lines.append("Next: 'terragrip calibrate' on a log, then 'terragrip estimate'.")

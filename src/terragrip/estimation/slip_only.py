@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from terragrip.errors import InputError
 from terragrip.estimation.rims import DRIVE, Rim, at_zero, calibrated_scale, rims_of
 from terragrip.estimation.zero_slip import REMEDY, Zero, zero_of
 from terragrip.recording import Recording
+from terragrip.recording.schema import has_engine_torque
 from terragrip.vehicle import Vehicle
 
 _MOVING = 0.1  # m/s
@@ -22,6 +24,11 @@ _WIDEST = 0.5  # m/s: a wider dead band is a missing speed
 WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
     "resistance, net traction and efficiency need a torque."
+)
+
+DRIVELINE = (
+    "The log has the engine's torque: with a 'driveline' in the vehicle file, adhesion, soil resistance, net traction and efficiency of "
+    "all driven wheels together can be estimated."
 )
 
 
@@ -36,12 +43,15 @@ class SlipReference:
 
 
 def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
-    """The slip reference from a log without torque; raises InputError if a wheel of it is not the vehicle's.
+    """The slip reference from a log without torque; raises InputError if a wheel of it is not the vehicle's, or none of them is driven.
 
     Slip of a wheel is relative to the radius of the vehicle file. The drive train's speed depends on a radius set in the machine. It
     is compared with the log's own zero, unless the vehicle's calibration gives the radii.
     """
+    _require_driven(log, vehicle)
     rims, zero, notes = [], {}, [WHAT_IS_MISSING]
+    if has_engine_torque(log.channels) and vehicle.driveline is None:
+        notes.append(DRIVELINE)
     radii = vehicle.radii if vehicle.knows_wheels else {}
     for rim in rims_of(vehicle, log.channels, log.source):
         at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius, radii=radii)
@@ -63,6 +73,20 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
             )
         notes.append(f"The rims read 0 in {rows} rows {why}")
     return SlipReference(tuple(rims), zero, band, tuple(notes))
+
+
+def _require_driven(log: Recording, vehicle: Vehicle) -> None:
+    driven = [wheel for wheel, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
+    free = [wheel for wheel in log.wheels if wheel in vehicle.wheels and wheel not in driven]
+    if free and free == list(log.wheels):
+        drive = "leave these out, for wheel_based_speed" if "wheel_based_speed" in log.channels else ""
+        raise InputError(
+            f"is missing: the log has speeds of free wheels alone ({', '.join(free)}), whose slip says nothing",
+            file=log.source,
+            place=f"column wheel_speed_{driven[0]}",
+            hint=drive or "name its column in a profile, or correct 'driven' in the vehicle file",
+            page="vehicle#signals-that-are-missing",
+        )
 
 
 def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:

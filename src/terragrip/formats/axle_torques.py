@@ -1,9 +1,10 @@
-"""The torque of a whole axle in a log: no wheel's, and how a profile gives it to the wheels."""
+"""Columns that name an axle: of its only wheel, or a torque of both, and how a profile gives that to the wheels."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from terragrip.formats.candidates import Column
@@ -14,6 +15,14 @@ if TYPE_CHECKING:
 
 _NUMBER = re.compile(r"(?:axle|achse|essieu|eje|assale)[\W_]*(\d)", re.IGNORECASE)
 _ENDS = {"front": "f", "rear": "r", "middle": "m"}
+
+
+def of_the_only_wheel(column: Column, vehicle: Vehicle | None) -> Column:
+    """The column as one of a wheel, where it names an axle that has a single one in the ``vehicle`` (the front one of a tricycle)."""
+    if vehicle is None or column.name.wheel or not column.name.has(*_ENDS):
+        return column
+    wheels = _wheels_of(column, vehicle, 1)
+    return replace(column, name=replace(column.name, wheel=wheels[0])) if len(wheels) == 1 else column
 
 
 def is_of_an_axle(column: Column) -> bool:
@@ -52,6 +61,11 @@ def axle_torque_hints(columns: Iterable[Column], vehicle: Vehicle | None) -> Ite
         yield (
             f"{column.column} is by its name the torque of an axle, which a differential shares evenly: give each wheel its part{ratio} "
             f"in the profile, {entries}{others}. Only their mean adhesion is then known."
+            + (
+                " If the axle has one wheel, inspect with its vehicle file: --vehicle."
+                if vehicle is None
+                else ""
+            )
         )
 
 

@@ -136,7 +136,7 @@ def profile_text(
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:
         lines.append("  # ground_speed: {from: ???, unit: m/s}   # needed: or derivative_of two positions")
-    if not has_torque(proposals):
+    if not has_torque(proposals) and not has_engine_torque(proposals):
         lines.append(
             "  # drive_torque_fl: {from: ???, unit: N m}   # of each driven wheel; without, slip alone"
         )

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
-from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle
+from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle, of_the_only_wheel
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.judgement import E7, Guess, Judge
@@ -93,7 +93,10 @@ def propose(
     each column (n,), without which nothing is held against time. The radii of a ``vehicle`` tell the unit of wheel speeds.
     """
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
-    columns = columns_of(tuple(numbers), constants, units, vocabulary)
+    columns = {
+        name: of_the_only_wheel(column, vehicle)
+        for name, column in columns_of(tuple(numbers), constants, units, vocabulary).items()
+    }
     evidence = Evidence(numbers, clocks or {})
     plane = _velocity_in_the_plane(columns, evidence)
     judge = Judge(columns, numbers, evidence)
