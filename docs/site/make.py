@@ -65,8 +65,8 @@ CONTENTS: dict[str, list[str]] = {
         "glossary",
         "licences",
     ],
-    "Science": ["physics", "methods", "families", "warning", "real-logs", "benchmarks"],
-    "Inside": ["architecture", "kernel", "mutants", "decisions/README"],
+    "Science": ["physics", "methods", "families", "families-history", "warning", "real-logs", "benchmarks"],
+    "Inside": ["architecture", "kernel", "tuned-numbers", "mutants", "decisions/README"],
 }
 """The site's table of contents. A page of docs/ that stands nowhere here is put at the end of the how-tos."""
 

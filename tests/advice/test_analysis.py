@@ -3,12 +3,13 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from advice_drives import VEHICLE, drive, slip_only
-from terragrip.advice.analysis import advise
+from terragrip.advice.analysis import _missing, advise
 from terragrip.advice.curves import adhesion
 from terragrip.advice.optimum import GRID, best_of, over_slip
 from terragrip.advice.result import to_dict, words, write
@@ -163,6 +164,20 @@ def test_a_drive_whose_adhesion_is_never_known_is_told_so():
         {name: np.full(len(one), np.nan) for name in one.columns if name.startswith("adhesion_")}
     )
     assert "with its adhesion known" in only([one]).missing[0]
+
+
+@pytest.mark.parametrize(
+    ("slip", "pulls"), [(0.3, "up to about 30% of slip"), (0.0, "beyond the 6% of slip that were reached")]
+)
+def test_what_would_show_the_slip_of_most_power_was_not_driven_yet(slip, pulls):
+    """A rover that tows nothing was told to drive 'with pulls up to about 0% of slip'."""
+    known = SimpleNamespace(net_traction=1.0, slip=0.05, interval=(0.04, 0.06))
+    curves = SimpleNamespace(reach=0.06, over=SimpleNamespace(loss=lambda _: 0.0))
+    power = SimpleNamespace(slip=slip, interval=(0.0, 0.6))
+    (said,) = [
+        one for one in _missing(known, power, curves, VEHICLE, measured=True) if "most pull power" in one
+    ]
+    assert said.endswith(f"a drive with pulls {pulls} would show it")
 
 
 def test_slip_above_the_best_is_never_told_to_load_more():

@@ -102,6 +102,10 @@ def test_what_a_machine_can_have_is_no_code(name: str, value: float) -> None:
         ("ground_speed", 65.535 / 3.6),
         ("drive_torque_fl", 655.35),
         ("drive_torque_fl", -1.0),
+        *(
+            ("drive_torque_fl", code)
+            for code in (655.34, -655.35, 327.67, -327.67, -327.68, 999.9, -999.9, -999.99, 999.99)
+        ),
     ],
 )
 def test_a_code_that_a_machine_could_have_is_named_where_single_samples_leap_to_it(
@@ -111,6 +115,15 @@ def test_a_code_that_a_machine_could_have_is_named_where_single_samples_leap_to_
     (note,) = notes_on(spoilt(name, code))
     assert note.startswith(f"{name} is {code:.6g} in ")
     assert "leaps there and back: a code for 'not measured'" in note
+
+
+def test_four_values_that_leap_are_no_code_and_a_slow_log_may_stop_and_go() -> None:
+    columns = drive()
+    columns["drive_torque_fl"][[500, 1500, 2500, 3500]] = 9999.0
+    assert not any("a code for" in note for note in notes_on(columns))
+    slow = {name: values[::8] for name, values in spoilt("drive_torque_fl", -1.0).items()}
+    assert np.count_nonzero(slow["drive_torque_fl"] == -1.0) > 5
+    assert not any("a code for" in note for note in notes_on(slow))
 
 
 def test_torques_in_whole_units_may_be_minus_1() -> None:

@@ -171,3 +171,10 @@ def test_a_link_to_what_is_not_there_opens_no_other_run(
     assert page.locator(said).count() == 1  # what is drawn anew leaves it
     assert page.locator(".chart").count() == 0
     assert path in page.evaluate("() => document.querySelector('main select').selectedOptions[0].textContent")
+    assert (
+        page.locator(".tools > :visible").count() == 1
+    )  # the choice: there is nothing to colour, save or zoom
+    page.select_option("main select", "estimates.parquet")
+    page.wait_for_selector(".chart")
+    if where == "map":  # it was hidden, and shows the whole track
+        page.wait_for_function("() => window.terragripMap.map.getZoom() > 14")

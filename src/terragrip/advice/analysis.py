@@ -186,9 +186,15 @@ def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, m
             f"to see it"
         )
     if power.interval[1] - power.interval[0] > WIDEST_POWER:
+        beyond = power.slip > curves.reach
+        pulls = (
+            f"up to about {power.slip:.0%} of slip"
+            if beyond
+            else f"beyond the {curves.reach:.0%} of slip that were reached"
+        )
         missing.append(
-            f"the slip of most pull power is only known to be {power.interval[0]:.0%} to {power.interval[1]:.0%} of slip: a drive with "
-            f"pulls up to about {power.slip:.0%} of slip would show it"
+            f"the slip of most pull power is only known to be {power.interval[0]:.0%} to {power.interval[1]:.0%}: a drive with pulls "
+            f"{pulls} would show it"
         )
     for key, unit in (
         ("working_width", "ha/h"),

@@ -58,7 +58,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
             f"{number(max(gap.pull[0], 0), 0)} to {number(max(gap.pull[1], 0), 0)} N",
             f"{number(gap.speed, 1)} m/s",
             f"{number(max(gap.seconds, 1), 0)} s",
-            "yes" if gap.reachable else "no: the curve falls there",
+            "yes" if gap.reachable else "no: the curve is flat or falls there",
         )
         for one in curves
         for gap in one.learned.gaps

@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from terragrip.soil.bins import Bins, BinSettings
 from terragrip.soil.library import Soil
 
+_STEADY = 0.1
+"""Pull over weight, by slip: where a curve rises less, a pull that is off by 1 % of the weight moves the slip by 10 % and more."""
+
 
 @dataclass(frozen=True)
 class Gap:
     """A stretch of slips without enough samples, and the drive that fills it.
 
     slip (low, high) [-]; drawbar pull (low, high) [N] for that slip; `seconds` of driving needed at `speed` [m/s] wheel
-    speed; `reachable` False where the curve falls with slip, because no steady pull keeps the vehicle at that slip.
+    speed; `reachable` False where the curve is flat or falls with slip, because no steady pull keeps the vehicle at that slip.
     """
 
     slip: tuple[float, float]
@@ -55,13 +58,15 @@ def what_to_drive(
     For a soil without a known resistance it is 0 (the pull is then the gross one).
     """
     weight, resistance = mass * gravity, soil.resistance[0] if soil.resistance else 0.0
-    peak = float(np.argmax(soil.value(np.linspace(0, 1, 1001)))) / 1000
     gaps = []
     for low, high in missing_slips(bins):
-        ends = (soil.value([low, high]) - resistance) * weight
+        start, end = soil.value([low, high])
+        pulls = sorted((float(one) - resistance) * weight for one in (start, end))
         cells = max(round((high - low) / bins.settings.width), 1)
         seconds = cells * bins.settings.minimum * sample_period / wheels
-        gaps.append(Gap((low, high), (float(ends.min()), float(ends.max())), seconds, speed, low < peak))
+        gaps.append(
+            Gap((low, high), (pulls[0], pulls[1]), seconds, speed, bool(end - start > _STEADY * (high - low)))
+        )
     return gaps
 
 
@@ -80,7 +85,7 @@ def in_words(name: str, gaps: Sequence[Gap]) -> list[str]:
             )
         elif not gap.reachable:
             out.append(
-                f"{start} The curve falls there, so no steady pull holds the vehicle: raise the pull past {gap.pull[1]:.0f} N"
+                f"{start} The curve is flat or falls there, so no steady pull holds the vehicle: raise the pull past {gap.pull[1]:.0f} N"
                 f"{speed} and log the way through, or hold the wheel speed by control."
             )
         else:

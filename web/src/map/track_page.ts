@@ -188,6 +188,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function frame(): void {
     if (!track?.count) return;
+    map.resize(); // without a run it was hidden
     const [, lon, lat] = track.data as [Float64Array, Float64Array, Float64Array];
     const bounds = new maplibre.LngLatBounds();
     for (let i = 0; i < lon.length; i++) bounds.extend([lon[i] as number, lat[i] as number]);
