@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
-from terragrip.formats import inspect, parquet, read
+from terragrip.formats import Profile, inspect, parquet, read
 from terragrip.formats.log_blocks import recordings_of
 from terragrip.recording import Recording
 
@@ -117,6 +117,22 @@ def test_blocks_refuse_what_the_whole_refuses(tmp_path: Path, log: pd.DataFrame)
         for reading in (read, lambda p: in_blocks(p, 100)):
             with pytest.raises(InputError, match=message):
                 reading(path)
+
+
+def test_a_name_that_occurs_twice_is_in_the_way_of_that_column_alone(
+    tmp_path: Path, log: pd.DataFrame
+) -> None:
+    """As in a text table: inspect refused the file for a column that nobody asked for."""
+    path = tmp_path / "log.parquet"
+    columns = [*log.columns, "Speed", "Speed"]
+    table = pa.Table.from_pandas(log, preserve_index=False)
+    pq.write_table(
+        pa.table([*table.columns, table["time"], table["time"]], names=columns), path, row_group_size=70
+    )
+    assert "Columns that occur twice are left out: Speed. Rename one to use it." in inspect(path).warnings
+    assert len(read(path)) == len(log)
+    with pytest.raises(InputError, match="column Speed: occurs twice"):
+        read(path, Profile.from_dict({"channels": {"ground_speed": "Speed"}}))
 
 
 def test_a_column_of_lists_is_refused(tmp_path: Path, log: pd.DataFrame) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.errors import InputError, nearest
-from terragrip.formats.profile_parts import Source, TimeSource, matching
+from terragrip.formats.profile_parts import MADE_OF, Source, TimeSource, matching
 from terragrip.formats.table import LogTable
 from terragrip.recording.checks import how_to_pivot
 from terragrip.recording.schema import TIME
@@ -87,7 +87,7 @@ def _bound(origin: Source, log: LogTable) -> Source | None:
         if held is None and origin.otherwise is not None:
             return None
         update["column"] = held or result[0]
-    for key in ("derivative_of", "norm_of", "sum_of", "pitch_of", "roll_of"):
+    for key in MADE_OF:
         names = getattr(origin, key)
         if names is not None:
             columns = [next(iter(matching(name, log.columns)), None) for name in names]

@@ -77,12 +77,11 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
 def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
-    stamps = Stamps(profile.time.column, profile.time.unit)
-    log = stamps.corrected(log)
+    log = Stamps(profile.time.column, profile.time.unit).corrected(log)
     wanted = asked(profile, log.columns)
     columns, repeats = merged({n: c for n, c in log.columns.items() if n in wanted}, profile.time.column)
     log = replace(log, columns=columns)
-    notes += [*stamps.notes, *repeats.notes()]
+    notes += repeats.notes()
     time, start, remarks = _time(profile.time, log)
     notes += remarks
     channels: dict[str, Column] = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing
-from terragrip.formats.csv_cells import body_of, chosen_of, parse
+from terragrip.formats.csv_cells import body_of, parse
 from terragrip.formats.dialect import detect
 from terragrip.formats.registry import Format
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
@@ -45,7 +45,7 @@ def csv_on_disk(path: str) -> TableOnDisk:
     notes: list[str] = []
 
     def blocks(names: list[str], every: int) -> Iterator[Columns]:
-        chosen = chosen_of(dialect, set(names), path)
+        chosen = [dialect.names.index(name) for name in names]
         row = 0
         parts = _lines(path, size if every == 1 else _LOOK) if whole is None else iter([(whole, True)])
         for number, (data, is_first) in enumerate(parts):
@@ -62,10 +62,8 @@ def csv_on_disk(path: str) -> TableOnDisk:
     named = [name for name in dialect.names if name]
     names = tuple(dict.fromkeys(named))
     twice = tuple(name for name in names if named.count(name) > 1)
-    if twice:
-        notes.append(f"Columns that occur twice are left out: {', '.join(twice)}. Rename one to use it.")
     is_long = whole is None and length > _LONG
-    return TableOnDisk(names, dialect.units, path, rows, blocks, notes, is_long=is_long, unreadable=twice)
+    return TableOnDisk(names, dialect.units, path, rows, blocks, notes, is_long=is_long, twice=twice)
 
 
 def _text_of(path: str) -> bytes:

@@ -25,16 +25,6 @@ _MISSING = [
 ]
 
 
-def chosen_of(dialect: Dialect, chosen: set[str], source: str) -> list[int]:
-    """The places of the columns ``chosen`` by name; raises InputError where one occurs twice."""
-    names = dialect.names
-    places = [k for k, name in enumerate(names) if name in chosen]
-    twice = next((names[k] for k in places if names.count(names[k]) > 1), None)
-    if twice is not None:
-        raise InputError("occurs twice", file=source, place=f"column {twice}", hint="keep one of them")
-    return places
-
-
 def body_of(
     data: bytes, dialect: Dialect, start: int, *, more: bool = False
 ) -> tuple[bytes | memoryview, list[str]]:

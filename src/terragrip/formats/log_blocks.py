@@ -64,7 +64,7 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
         chosen = [name for name in log.names if is_own(name)]
         own = (
             in_si(block)
-            for block in _with_time_base(log, log.blocks(chosen, 1), table, TIME, log.units.get(TIME, "s"))
+            for block in _with_time_base(log, log.read(chosen), table, TIME, log.units.get(TIME, "s"))
         )
         return aligned(_checked(own, log.names, chosen, log.source, log.digest, about, log.notes))
     result = settled(profile, table)
@@ -91,7 +91,7 @@ def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _Abou
     wanted = asked(profile, log.names)
     first = None
     blocks = _one_row_an_instant(
-        log, log.blocks([name for name in log.names if name in wanted], 1), profile.time.column
+        log, log.read([name for name in log.names if name in wanted]), profile.time.column
     )
     for block in _with_time_base(log, blocks, table, profile.time.column, profile.time.unit):
         stamps = block.columns[profile.time.column]
@@ -111,7 +111,7 @@ def _with_time_base(
     stamps = Stamps(column, unit)
     for block in blocks:
         part = stamps.corrected(replace(table, columns=block))
-        log.notes.extend(note for note in stamps.notes if note not in log.notes)
+        log.notes.extend(note for note in part.notes if note not in log.notes)
         yield part
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
+from terragrip.formats.matlab_long import long_matlab
 from terragrip.formats.matlab_objects import TICKS, plain
 from terragrip.formats.matlab_records import IN_RECORDS, STREAM, resolved
 from terragrip.formats.matlab_signals import Contents, seconds_of, walk
@@ -25,10 +26,6 @@ from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
 from terragrip.formats.table import LogTable, Wanted
 from terragrip.formats.worker import Reading, UnreadableError, Worker
-
-if TYPE_CHECKING:
-    from terragrip.formats.table_on_disk import TableOnDisk
-
 
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
@@ -196,12 +193,6 @@ def _of_one_length(loose: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for (name, value), n in zip(loose.items(), lengths, strict=True) if n == length}
 
 
-def _in_blocks(path: str) -> TableOnDisk | None:
-    from terragrip.formats.matlab_long import long_matlab
-
-    return long_matlab(path)
-
-
 FORMATS = (
     Format(
         "matlab",
@@ -209,6 +200,6 @@ FORMATS = (
         read_matlab,
         (".mat",),
         (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n"),
-        in_blocks=_in_blocks,
+        in_blocks=long_matlab,
     ),
 )

@@ -29,12 +29,11 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     with _opened(path) as file:
         # Not `Schema.empty_table`: it wakes pandas.
         fields = tuple(_flat(pa.Table.from_batches([], file.schema_arrow)).schema)
-        names = tuple(str(field.name) for field in fields)
+        named = [str(field.name) for field in fields]
         count = int(file.metadata.num_rows)
         unreadable = tuple(field.name for field in fields if not _is_readable(field))
 
     def blocks(chosen: list[str], every: int) -> Iterator[Columns]:
-        _refuse_twice(names, chosen, path)
         with _opened(path) as file:
             batches = file.iter_batches(batch_size=ROWS if every <= 1 else _BLOCK, columns=chosen)
             number = 0
@@ -44,9 +43,10 @@ def parquet_on_disk(path: str) -> TableOnDisk:
                     yield {name: from_arrow(name, table.column(name), path) for name in chosen}
                 number += 1
 
-    return TableOnDisk(
-        names, {}, path, count, blocks, is_long=os.path.getsize(path) >= _LONG, unreadable=unreadable
-    )
+    names = tuple(dict.fromkeys(named))
+    twice = tuple(name for name in names if named.count(name) > 1)
+    is_long = os.path.getsize(path) >= _LONG
+    return TableOnDisk(names, {}, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
 
 
 def _flat(table: pa.Table) -> pa.Table:
@@ -85,12 +85,6 @@ def _guarded(source: str, work: Callable[[], Any]) -> Any:
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         problem = f"is a damaged Parquet file, or none ({str(error)[:100]})"
         raise InputError(problem, file=source, hint="write it again, or give a CSV file") from error
-
-
-def _refuse_twice(names: tuple[str, ...], chosen: list[str], source: str) -> None:
-    twice = next((name for name in chosen if names.count(name) > 1), None)
-    if twice is not None:
-        raise InputError("occurs twice", file=source, place=f"column {twice}", hint="keep one of them")
 
 
 FORMATS = (

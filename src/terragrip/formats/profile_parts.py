@@ -26,6 +26,8 @@ def _with_factors(value: object) -> object:
 
 
 Quaternion = tuple[str, str, str, str]
+MADE_OF = ("derivative_of", "norm_of", "sum_of", "pitch_of", "roll_of")
+"""Keys of a `Source` that name the columns which it is computed from."""
 
 
 class Forward(Part):
@@ -77,14 +79,8 @@ class Source(Part):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        given = [
-            k
-            for k in ("column", "derivative_of", "norm_of", "sum_of", "pitch_of", "roll_of", "constant")
-            if getattr(self, k) is not None
-        ]
-        if len(given) != 1:
-            hint = "write one of from, derivative_of, norm_of, sum_of, pitch_of, roll_of, constant"
-            raise Fault("needs exactly one source", hint)
+        if sum(getattr(self, key) is not None for key in ("column", *MADE_OF, "constant")) != 1:
+            raise Fault("needs exactly one source", f"write one of from, {', '.join(MADE_OF)}, constant")
         for key in ("window", "forward"):
             if key in self.model_fields_set and self.derivative_of is None:
                 raise Fault("works with derivative_of only", "leave it out", (key,))
@@ -138,17 +134,8 @@ class Source(Part):
     def columns(self) -> tuple[str, ...]:
         """The log's columns that it may read, or patterns of them; those of `otherwise` are its own."""
         heading = () if self.forward is None else (self.forward.yaw, *(self.forward.quaternion or ()))
-        every = (
-            *self.candidates,
-            self.over,
-            *(self.derivative_of or ()),
-            *(self.norm_of or ()),
-            *(self.sum_of or ()),
-            *(self.pitch_of or ()),
-            *(self.roll_of or ()),
-            *heading,
-        )
-        return tuple(name for name in every if name is not None)
+        parts = (name for key in MADE_OF for name in getattr(self, key) or ())
+        return tuple(name for name in (*self.candidates, self.over, *parts, *heading) if name is not None)
 
 
 class TimeSource(Part):

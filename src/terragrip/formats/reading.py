@@ -82,10 +82,8 @@ def recording_of(table: LogTable, profile: Profile | None) -> Recording:
 
 def _as_it_stands(table: LogTable) -> Recording:
     _require(table)
+    table = _timed(table)
     notes = [*table.notes, *checks.remarks(table.names)]
-    stamps = Stamps(TIME, _time_unit(table))
-    table = stamps.corrected(table)
-    notes += stamps.notes
     return Recording.from_frame(
         in_si(table), table.source, sha256=table.sha256, notes=notes, start=table.start
     )
@@ -181,17 +179,17 @@ def _part(path: PathLike, profile: Profile | None, databases: Databases, also: t
             place=f"column {TIME}",
             hint="name it in a profile for this source",
         )
-    stamps = Stamps(TIME, _time_unit(table))
-    table = stamps.corrected(table)
+    table = _timed(table)
     columns = in_si(table)
     written = columns.pop(TIME)
     time, _ = seconds(written, table.source)
     start = table.start if table.start is not None else start_of(written, time)
-    return Part(time, columns, table.source, table.sha256, (*table.notes, *stamps.notes), {}, start)
+    return Part(time, columns, table.source, table.sha256, table.notes, {}, start)
 
 
-def _time_unit(table: LogTable) -> str:
-    return table.units.get(TIME, "s")
+def _timed(table: LogTable) -> LogTable:
+    """A table with our own names, its stamps a time base."""
+    return Stamps(TIME, table.units.get(TIME, "s")).corrected(table)
 
 
 def _require(table: LogTable) -> None:

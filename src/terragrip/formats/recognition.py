@@ -19,6 +19,7 @@ from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle, of_
 from terragrip.formats.candidates import Column, candidates_of, columns_of, kind_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.judgement import E7, Guess, Judge
+from terragrip.formats.profile_parts import MADE_OF
 from terragrip.formats.rim_units import own_name, radius_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.checks import PLACES
@@ -67,8 +68,7 @@ class Proposal:
     @property
     def columns(self) -> tuple[str, ...]:
         """The log's columns that it would read."""
-        keys = ("from", "derivative_of", "norm_of", "sum_of", "pitch_of")
-        result = next((self.entry[k] for k in keys if k in self.entry), None)
+        result = next((self.entry[key] for key in ("from", *MADE_OF) if key in self.entry), None)
         return (result,) if isinstance(result, str) else tuple(result) if isinstance(result, list) else ()
 
 

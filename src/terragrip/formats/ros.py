@@ -43,7 +43,7 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
             if topic.is_wanted:
                 topic.push(receipt, content, decode)
     if lost:
-        notes.append(f"{lost} messages are of undescribed connections were left out.")
+        notes.append(f"{lost} messages of undescribed connections were left out.")
     return log_of(topics.values(), path, [*types.notes(), *notes])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,17 +17,16 @@ _ABOUT = 60.0  # s: what a log may miss around midnight
 
 @dataclass
 class Stamps:
-    """The stamps of a log in ``column``, in ``unit``, as its blocks come, one after the other; ``notes`` on what was done to them."""
+    """The stamps of a log in ``column``, in ``unit``, as its blocks come, one after the other."""
 
     column: str
     unit: str
-    notes: list[str] = field(default_factory=list)
     _started: bool = False
     _last: float | None = None  # s
     _midnights: float = 0.0  # s that they are to be moved by
 
     def corrected(self, block: LogTable) -> LogTable:
-        """The next block, its stamps a time base."""
+        """The next block, its stamps a time base; what was done to them is among its notes."""
         if not self._started:
             self._started = len(block.columns[self.column]) > 0
             block = self._since_clock_was_set(block)
@@ -50,10 +49,9 @@ class Stamps:
             return table
         count = int(jumps[-1]) + 1
         rows = "row was" if count == 1 else "rows were"
-        self.notes.append(
-            f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
-        )
-        return replace(table, columns={name: values[count:] for name, values in table.columns.items()})
+        note = f"The first {count} {rows} stamped before the logger's clock was set ({stamps[0]}, then {stamps[count]}), and left out."
+        left = {name: values[count:] for name, values in table.columns.items()}
+        return replace(table, columns=left, notes=(*table.notes, note))
 
     def _past_midnight(self, table: LogTable) -> LogTable:
         """The table, its stamps counted on where the clock began anew."""
@@ -73,12 +71,13 @@ class Stamps:
         anew = (days > 0) & (days - back < _ABOUT) & (seconds[known] < _WEEK)
         moved[known] = np.where(anew, days, 0.0)
         self._last = float(seconds[known[-1]])
+        notes = table.notes
         if moved.any() and not self._midnights:
-            self.notes.append("time begins anew at midnight in the log: what follows counts on from there.")
+            notes += ("time begins anew at midnight in the log: what follows counts on from there.",)
         moved = self._midnights + np.cumsum(moved)
         self._midnights = float(moved[-1])
         if not self._midnights:
             return table
         moved /= tick
         counted = stamps + (np.round(moved).astype(np.int64) if stamps.dtype.kind in "iu" else moved)
-        return replace(table, columns={**table.columns, self.column: counted})
+        return replace(table, columns={**table.columns, self.column: counted}, notes=notes)

@@ -30,10 +30,7 @@ def is_packed(source: str) -> bool:
 
 def opened(source: str) -> BinaryIO:
     """The file, unpacked as it is read; raises InputError where it cannot be opened."""
-    try:
-        return gzip.open(source, "rb") if is_packed(source) else open(source, "rb")  # type: ignore[return-value]
-    except OSError as error:
-        raise unreadable(source, error) from error
+    return gzip.open(source, "rb") if is_packed(source) else open(source, "rb")  # type: ignore[return-value]
 
 
 def read(stream: BinaryIO, size: int, source: str) -> bytes:
