@@ -2,8 +2,6 @@
 #ifndef TG_CURVE_H
 #define TG_CURVE_H
 #include "filter.h"
-#include <math.h>
-#include <string.h>
 
 /* The prototype (paper eq. 8): g(s) = 1 - p e^(alpha_1 s) - (1 - p) e^(alpha_2 s), and k = -alpha_2 of its rise A (1 - exp(-k s)). */
 #define TG_CURVE_SHARE ((tg_real)0.52)

@@ -2,10 +2,7 @@
 #ifndef TG_ESTIMATOR_H
 #define TG_ESTIMATOR_H
 #include "curve.h"
-#include "filter.h"
 #include "slip.h"
-#include <math.h>
-#include <string.h>
 
 typedef struct { /* an input between its samples */
     tg_real value;    /* filtered */

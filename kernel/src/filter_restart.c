@@ -1,7 +1,5 @@
 /* Restart the filter with its knowledge of the ground and new outputs. */
 #include "factor.h"
-#include "filter.h"
-#include "lanes.h"
 
 /* The factors of the parameters' marginal, widened by q, then of fresh outputs with variances q. */
 static void restart_factors(int n, int stride, const tg_real *q, tg_real *u, tg_real *d)

@@ -166,28 +166,27 @@ static tg_status check_wheels(const tg_settings *s)
     return TG_OK;
 }
 
+/* Whether all numbers of an array, or of a structure that is nothing but reals, are finite and positive, or at least not negative. */
+static int are_sound(const void *numbers, size_t size, int positive)
+{
+    const tg_real *const x = numbers;
+    for (size_t k = 0; k < size / sizeof *x; k++)
+        if (positive ? !tgi_positive(x[k]) : !tgi_not_negative(x[k])) return 0;
+    return 1;
+}
+
 static tg_status check_numbers(const tg_settings *s)
 {
-    const tg_uncertainty *u = &s->uncertainty;
-    const tg_real spreads[] = {u->drive_torque_gain, u->drive_torque_gain_common, u->drive_torque_offset, u->drawbar_gain, u->drawbar_offset, u->slope,
-                               u->tire_rolling_resistance, u->vertical_load, u->wheel_radius, u->acceleration_bias, u->mass, u->hitch_load_gain,
-                               u->hitch_load_offset, s->ground_speed_delay, s->payload_height,
-                               s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight, s->load_filter, s->center_of_gravity_height,
-                               s->hitch_height, s->watch.ahead, s->watch.beyond, s->watch.most, s->watch.high_slip,
-                               s->watch.stuck_duration, s->watch.stuck_travel, s->watch.free_travel, s->watch.push, s->watch.thrust,
-                               s->watch.push_duration};
-    const tg_real positive[] = {s->watch.pace, s->watch.memory, s->watch.usual, s->watch.soon, s->watch.change, s->watch.command,
-                                s->watch.resistance,
-                                s->prior_adhesion_std, s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter,
-                                s->noise[TG_GROUND_SPEED], s->noise[TG_ACCELERATION_X]};
-    const tg_real *const tuned = (const tg_real *)&s->tuned; /* all of them reals */
-    for (size_t k = 0; k < sizeof s->tuned / sizeof *tuned; k++)
-        if (!tgi_positive(tuned[k])) return TG_NOT_POSITIVE;
-    for (size_t k = 0; k < sizeof spreads / sizeof *spreads; k++)
-        if (!tgi_not_negative(spreads[k])) return TG_NOT_POSITIVE;
-    for (size_t k = 0; k < sizeof positive / sizeof *positive; k++)
-        if (!tgi_positive(positive[k])) return TG_NOT_POSITIVE;
-    if (!tgi_finite(s->watch.warn) || !tgi_finite(s->prior_adhesion) || !tgi_finite(s->prior_resistance)) return TG_NOT_FINITE;
+    const tg_watch_settings *const w = &s->watch;
+    const tg_real spreads[] = {s->ground_speed_delay, s->payload_height, s->slope_spread, s->standstill_speed, s->dead_band, s->outlier_weight,
+                               s->load_filter, s->center_of_gravity_height, s->hitch_height, w->ahead, w->beyond, w->most, w->high_slip,
+                               w->stuck_duration, w->stuck_travel, w->free_travel, w->push, w->thrust, w->push_duration};
+    const tg_real positive[] = {w->pace, w->memory, w->usual, w->soon, w->change, w->command, w->resistance, s->prior_adhesion_std,
+                                s->prior_resistance_std, s->gap, s->max_step, s->algebraic_filter, s->noise[TG_GROUND_SPEED],
+                                s->noise[TG_ACCELERATION_X]};
+    if (!are_sound(&s->tuned, sizeof s->tuned, 1) || !are_sound(&s->uncertainty, sizeof s->uncertainty, 0)) return TG_NOT_POSITIVE;
+    if (!are_sound(spreads, sizeof spreads, 0) || !are_sound(positive, sizeof positive, 1)) return TG_NOT_POSITIVE;
+    if (!tgi_finite(w->warn) || !tgi_finite(s->prior_adhesion) || !tgi_finite(s->prior_resistance)) return TG_NOT_FINITE;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
         if (!tgi_finite(s->offset[k])) return TG_NOT_FINITE;
         if (!tgi_positive(s->gain[k]) || !tgi_not_negative(s->noise[k]) || !tgi_not_negative(s->held_period[k])) return TG_NOT_POSITIVE;

@@ -2,7 +2,6 @@
 #ifndef TG_SLIP_H
 #define TG_SLIP_H
 #include "model.h"
-#include <math.h>
 
 typedef struct { /* slip, and its change with omega, v and the relative radius */
     tg_real slip, wheel, ground, radius;
