@@ -6,8 +6,8 @@ import logging
 from typing import Any
 
 LIVE = (
-    "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "late", "unreadable", "schema",
-    "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned", "units",
+    "source_lost", "source_back", "channel_lost", "channel_back", "clock_jump", "clock_corrected", "late", "unreadable",
+    "schema", "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned", "units",
     "contradiction", "immobilization", "stuck", "push",
 )  # fmt: skip
 """Of the live service; sinks get these too (terragrip.live.event)."""

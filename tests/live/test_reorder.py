@@ -249,25 +249,43 @@ def test_samples_that_were_held_up_and_come_at_once_are_no_fast_clock() -> None:
     assert late + [pace.wrong(10.1 + 0.1 * k, 10.0 + 0.1 * k) for k in range(100)] == [None] * 200
 
 
-def late_events(vehicle, short, shift: float, until: float = 6.0) -> list[Event]:
-    """Wheels of one source, ground speed of another whose clock is off by ``shift`` [s] up to an instant."""
-    core = Core(vehicle, Settings(("udp://a", "udp://b")))
+def two_clocks(vehicle, short, stamp, lag=0.001) -> tuple[Core, list[Event]]:
+    """Wheels of one source, on the machine's clock; ground speed of another, stamped by ``stamp(time)`` and so late [s]."""
+    core = Core(vehicle, Settings(("udp://a", "udp://b"), learn=False))
     out = []
     for time, values in list(rows_of(short.recording))[::10]:
         speed = {"ground_speed": values.pop("ground_speed")}
         out += core.process(time, 0, time, values)
-        out += core.process(time + 0.001, 1, time + (shift if time < until else 0.0), speed)
-    return [one for one in out if isinstance(one, Event) and one.kind == "late"]
+        out += core.process(time + lag, 1, stamp(time), speed)
+    return core, [one for one in out if isinstance(one, Event)]
 
 
-@pytest.mark.parametrize(("shift", "who"), [(-0.4, "udp://b"), (0.4, "udp://a")])
-def test_a_source_whose_clock_is_some_tenths_behind_is_named_once(vehicle, short, shift, who):
-    (event,) = late_events(vehicle, short, shift)
-    assert event.source == who
-    assert "set the sources' clocks" in event.text
-    assert 2.0 <= event.time < 3.0
+@pytest.mark.parametrize(
+    ("shift", "text"),
+    [(-0.4, "0.4 s behind"), (0.4, "+0.399 s"), (3600.0, "+3599.999"), (-3600.0, "-3600.001")],
+)
+def test_a_second_clock_that_is_off_is_corrected_and_named(vehicle, short, shift, text):
+    core, (event,) = two_clocks(vehicle, short, lambda time: time + shift)
+    assert (event.kind, event.source) == ("clock_corrected", "udp://b")
+    assert text in event.text
+    assert event.time < 3.0
+    assert all(counts["late"] <= 22 for counts in core.counts.by_channel.values())
 
 
 def test_clocks_in_step_and_a_lag_of_a_second_are_no_late_source(vehicle, short):
-    assert late_events(vehicle, short, 0.0) == []
-    assert late_events(vehicle, short, -0.4, until=1.0) == []
+    for stamp in (lambda time: time, lambda time: time - (0.4 if time < 1.0 else 0.0)):
+        assert two_clocks(vehicle, short, stamp)[1] == []
+
+
+@pytest.mark.parametrize("ppm", [-50.0, 50.0])
+def test_a_clock_that_drifts_is_followed(ppm):
+    clock, wrong, news = SourceClock(align=True), [], []
+    for k in range(36000):  # an hour at 10 Hz
+        arrival = 0.1 * k + 0.005 + 0.002 * (k % 7)
+        ((_, time, _),), _, _ = clock.place(arrival, 0.1 * k * (1 + 1e-6 * ppm), {})
+        wrong.append(time - 0.1 * k)
+        news += [clock.news] if clock.news else []
+        clock.news = ""
+    assert max(map(abs, wrong)) < 0.003  # unfollowed: 0.18 s
+    assert 2 <= len(news) <= 4
+    assert f"{1e-6 * ppm * 400:+.2g}" in news[0]

@@ -10,14 +10,16 @@ hole they left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
+
+from terragrip.live.drift import Drift
 
 AHEAD = 1.0  # s
 JUMP = 10.0  # s
 AGREEMENT = 1.0  # s, and how closely in s leads must agree
 LOSS = 10.0  # s after samples were dropped, in which stamps may lead on by any step
-SYNCHRONISED = 1.0  # s: stamps this close to the machine's clock are on it already
+SYNCHRONISED = -1.0, 0.02  # s: first leads in which a source counts as on the machine's clock already
 LATE = 2.0  # s of arrivals, all behind rows already released, after which that is reported
 _WAITING = 5000
 _MARKS, _APART, _TOO_FAST = 4, 0.5, 50.0  # of `Pace`: marks, s between them, s a second
@@ -46,7 +48,10 @@ class Pace:
 
 @dataclass(slots=True)
 class SourceClock:
-    """``align``: set this clock against the machine's, as several sources need; alone, stamps stay as they are."""
+    """``align``: set this clock against the machine's and follow its drift, as several sources need; alone, stamps stay as they are.
+
+    ``news``: what was corrected, for an event; the core clears it.
+    """
 
     align: bool = False
     offset: float | None = None  # s, added to a stamp
@@ -56,6 +61,8 @@ class SourceClock:
     loss_until: float = float("-inf")  # arrival
     waiting: list[Stamped] = field(default_factory=list)
     late_since: float | None = None  # arrival; inf once reported
+    drift: Drift = field(default_factory=Drift)
+    news: str = ""
 
     def place(
         self, arrival: float, stamp: float, values: Values
@@ -63,7 +70,10 @@ class SourceClock:
         """One sample: what may go on (arrival, time, values), what is refused, and by how much the clock jumped (0: not)."""
         lead = stamp - arrival
         if self.offset is None:
-            self.offset = -lead if self.align and abs(lead) > SYNCHRONISED else 0.0
+            self.offset = 0.0
+            if self.align and not SYNCHRONISED[0] <= lead <= SYNCHRONISED[1]:
+                self.offset, self.drift.usual = -lead, 0.0
+                self.news = f"its clock is {lead:+.9g} s against this machine's: corrected by the arrivals"
             self.lead = lead
         step, lossy = lead - self.lead, arrival <= self.loss_until
         if step <= AHEAD and (step >= -JUMP or stamp > self.newest or lossy):
@@ -82,6 +92,7 @@ class SourceClock:
         # Time goes on as the arrivals say, on the new stamps.
         self.offset += self.newest + (first_arrival - self.arrival) - first_stamp
         self.newest = float("-inf")
+        self.drift.restart()
         return self._accept_waiting(), refused, step
 
     def _judged_by(self, now: float, reached: float) -> tuple[list[Stamped], list[Stamped]]:
@@ -108,7 +119,14 @@ class SourceClock:
         assert self.offset is not None
         if stamp > self.newest:
             self.newest, self.arrival, self.lead = stamp, arrival, stamp - arrival
-        return arrival, stamp + self.offset, values
+        time = stamp + self.offset
+        if self.align and (step := self.drift.correction(arrival, time - arrival)):
+            self.offset += step
+            if self.drift.is_news():
+                self.news = (
+                    f"its clock has drifted by {-self.drift.total:+.2g} s against this machine's: corrected"
+                )
+        return arrival, time, values
 
     def dropped(self, arrival: float) -> None:
         """Samples were lost on their way up to this arrival."""
@@ -120,10 +138,23 @@ class SourceClock:
             self.late_since = None
         elif self.late_since is None:
             self.late_since = arrival
+            self.drift.restart()
         elif arrival - self.late_since >= LATE:
             self.late_since = float("inf")
             return True
         return False
+
+    def set_by_arrivals(self, least: float) -> float:
+        """All samples of a while came too late: how far stamps are now set forward [s]; 0 where that is not above ``least``, or alone."""
+        assert self.offset is not None
+        if not self.align or not self.drift.leads:
+            return 0.0
+        step = self.drift.behind()
+        if step <= least:
+            return 0.0
+        self.offset += step
+        self.late_since = None
+        return step
 
     def give_up(self) -> list[Stamped]:
         """The samples that wait, now refused: no more will come to agree with them."""
@@ -132,11 +163,11 @@ class SourceClock:
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return {**{name: getattr(self, name) for name in self.__slots__}, "drift": asdict(self.drift)}
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> SourceClock:
         """The inverse of `state`."""
-        result = cls(**state)
+        result = cls(**{**state, "drift": Drift(**state["drift"])})
         result.waiting = [(a, s, v) for a, s, v in state["waiting"]]
         return result

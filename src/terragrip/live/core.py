@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 WINDOW = 0.02  # s
-FORMAT = 3  # of `Core.state`
+FORMAT = 4  # of `Core.state`
 _WARNINGS = {
     "immobilization": "about to dig in",
     "stuck": "stuck",
@@ -183,21 +183,33 @@ class Core:
         if pace is not None:
             text = f"time advances by {pace:.3g} s in a second: state its unit in a profile, 'time: {{from: ..., unit: ms}}'"
             out.append(Event(self.time, "units", self.settings.sources[source], text))
-        accepted, refused, jump = self.clocks[source].place(arrival, stamp, values)
+        clock, name = self.clocks[source], self.settings.sources[source]
+        accepted, refused, jump = clock.place(arrival, stamp, values)
+        if clock.news:
+            out.append(Event(self.time, "clock_corrected", name, clock.news))
+            clock.news = ""
         if refused:
             self._refuse_stamps(source, refused, out)
         if jump:
             text = f"the clock jumped by {jump:+.5g} s; time continues without the jump"
-            out.append(Event(self.time, "clock_jump", self.settings.sources[source], text))
+            out.append(Event(self.time, "clock_jump", name, text))
         for when, time, one in accepted:
             unused = self.reorder.add(when, source, time, one)
             if unused:
                 out.append(Refusal(when, time, source, "late or doubled", unused))
-            if self.clocks[source].is_behind(when, len(unused) == len(one) and time < self.time):
-                text = f"all that comes is stamped {self.time - time:.2g} s behind rows already estimated, and refused"
-                text += ": set the sources' clocks, or give a longer --window"
-                out.append(Event(self.time, "late", self.settings.sources[source], text))
+            if clock.is_behind(when, len(unused) == len(one) and time < self.time):
+                out.append(self._all_late(clock, name, self.time - time))
         return self._release(self.reorder.ready(arrival), out)
+
+    def _all_late(self, clock: SourceClock, name: str, behind: float) -> Event:
+        """The event of a source all of whose samples were refused for a while; its clock is set, where that is the reason."""
+        if step := clock.set_by_arrivals(self.settings.window / 2):
+            text = f"its clock is {step:.2g} s behind this machine's, or its samples travel for so long: corrected by the arrivals"
+            return Event(
+                self.time, "clock_corrected", name, text + "; if they travel, give a longer --window"
+            )
+        text = f"all that comes is stamped {behind:.2g} s behind rows already estimated, and refused"
+        return Event(self.time, "late", name, text + ": set the sources' clocks, or give a longer --window")
 
     def _refuse_stamps(self, source: int, refused: list[Stamped], out: list[Output]) -> None:
         for arrival, stamp, values in refused:
