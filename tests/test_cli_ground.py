@@ -72,6 +72,16 @@ def test_one_drive_with_a_library(files, tmp_path, capsys):
     assert json.loads(out.read_text()) == data
 
 
+def test_times_are_by_the_clock_where_the_log_has_one(files, tmp_path, capsys):
+    """As in report and studio: seconds since 1970 were printed."""
+    run, out = Estimates.read(files[0]), tmp_path / "ground.json"
+    run.about["recording"] = {**run.about.get("recording", {}), "time_zero": "2026-07-14T10:00:00+00:00"}
+    run.write(tmp_path / "dated.parquet")
+    assert main(["ground", str(tmp_path / "dated.parquet"), "-o", str(out)]) == 0
+    assert "\n  10:00:00  10:00:" in capsys.readouterr().out
+    assert json.loads(out.read_text())["sections"][0]["start"] < 10
+
+
 def test_many_drives_without_a_library(files, tmp_path, capsys):
     out, folder = tmp_path / "ground.json", tmp_path / "tables"
     assert main(["ground", *map(str, files), "-o", str(out), "--table", str(folder), "--online"]) == 0

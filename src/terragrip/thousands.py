@@ -11,9 +11,15 @@ _GROUPED = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?P<sign>[{SIGNS}])\d{{3}}(?:(?P=sig
 
 _WITH_UNIT = re.compile(
     r"[+-]?\d+(?:[.,]\d+)?\s*(?P<unit>[kcm]?m/s(?:²|\^?2)?|km/h|kph|mph|kn|rpm|[1U]/min|rad(?:/s)?|deg(?:/s)?|°(?:/s)?|%|da?N|[kM]N|"
-    r"(?:k|da)?N[ ·]?m|kgf?|lbf?|bar|kW)",
+    r"(?:k|da)?N[ ·]?m|kgf?|lbf?|bar|kW|m?A|m?s)",
     re.IGNORECASE,
 )
+
+
+def unit_in(cell: str) -> str | None:
+    """The unit of a number that is written with it (``3.2 km/h``); None of any other text."""
+    found = _WITH_UNIT.fullmatch(cell)
+    return found["unit"] if found else None
 
 
 def is_grouped(cell: str, sign: str) -> bool:
@@ -34,11 +40,8 @@ def has_thousands(cells: Sequence[str], sign: str) -> bool:
 
 def complaint(cell: str) -> tuple[str, str] | None:
     """What is wrong with a cell that has its unit, or may have a sign between thousands, and what to write; None where it has neither."""
-    if found := _WITH_UNIT.fullmatch(cell):
-        return (
-            f"{cell!r} has its unit in the cell",
-            f"write numbers alone, and [{found['unit']}] behind the name",
-        )
+    if unit := unit_in(cell):
+        return f"{cell!r} has its unit in the cell", f"write numbers alone, and [{unit}] behind the name"
     sign = next((sign for sign in SIGNS if is_grouped(cell, sign)), None)
     if sign is None:
         return None

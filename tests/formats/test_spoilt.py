@@ -53,13 +53,22 @@ def test_a_text_among_numbers_is_named_with_its_row(tmp_path: Path, cell: str) -
     assert "is not a number" not in said(log(tmp_path / "b.csv"))
 
 
-def test_units_in_the_cells_are_named_and_refused(tmp_path: Path) -> None:
-    """Grafana's export writes them; one row may be in another unit than the next."""
-    note = said(log(tmp_path / "a.csv", NAMES[1], every=table()[NAMES[1]].map("{:.1f} km/h".format)))
-    assert "has its unit in the cell; write numbers alone, and [km/h] behind the name" in note
-    (tmp_path / "b.csv").write_text("time,ground_speed,wheel_speed_l\n0,3.2 km/h,1\n1,3.3 km/h,1\n")
+def test_units_in_the_cells_are_read_where_they_are_one(tmp_path: Path) -> None:
+    """Grafana's export writes them; one row may be in another unit than the next. All were refused."""
+    head, rows = "time;ground_speed;wheel_speed_l\n", ["0 s;3,6 km/h;1\n", "1 s;--;1,5\n", "2 s;7,2 km/h;2\n"]
+    (tmp_path / "a.csv").write_text(head + "".join(rows))
+    result = read(tmp_path / "a.csv")
+    np.testing.assert_allclose(result.channels["ground_speed"], [1.0, np.nan, 2.0])
+    np.testing.assert_allclose(result.time, [0, 1, 2])
+    (tmp_path / "b.csv").write_text(head + "".join(rows) + "3 s;2,1 m/s;1\n")
     with pytest.raises(InputError, match=r"has its unit in the cell"):
         read(tmp_path / "b.csv")
+    later = [f"{k} s;{k % 9} km/h;1\n" for k in range(3, 200)]
+    (tmp_path / "c.csv").write_text(head + "".join(rows + later) + "200 s;2,1 m/s;1\n")
+    with pytest.raises(InputError, match="column ground_speed, row 201: is in m/s, the first rows in km/h"):
+        read(tmp_path / "c.csv")
+    note = said(log(tmp_path / "d.csv", NAMES[1], every=table()[NAMES[1]].map("{:.1f} km/h".format)))
+    assert "in the cell" not in note
 
 
 def test_signs_between_thousands_are_named(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -142,11 +143,16 @@ def summary(grounds: list[Ground]) -> str:
 
 
 def _sections(ground: Ground) -> list[str]:
-    rows: list[tuple[str, ...]] = [("  from s", "to s", "soil", "probability", "slip", "adhesion")]
+    from terragrip.report.clock import Clock
+
+    zero = (ground.about.get("recording") or {}).get("time_zero")
+    clock = Clock(datetime.fromisoformat(zero) if zero else None, ground.end - ground.start)
+    rows: list[tuple[str, ...]] = [("  from", "to", "soil", "probability", "slip", "adhesion")]
     for one in ground.sections:
         slip = "" if one.slip_mean is None else f"{one.slip_mean:.3f} ± {one.slip_std:.3f}"
         adhesion = "" if one.adhesion_mean is None else f"{one.adhesion_mean:.3f} ± {one.adhesion_std:.3f}"
         chance = f"{one.probabilities[one.soil]:.2f}"
-        rows.append((f"  {one.start:.1f}", f"{one.end:.1f}", one.soil, chance, slip, adhesion))
+        start, end = clock.text(one.start, 1), clock.text(one.end, 1)
+        rows.append((f"  {start}", end, one.soil, chance, slip, adhesion))
     widths = [max(len(row[i]) for row in rows) for i in range(6)]
     return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]

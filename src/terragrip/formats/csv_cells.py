@@ -12,7 +12,7 @@ from terragrip.errors import InputError
 from terragrip.formats.dialect import Dialect, split
 from terragrip.formats.table import from_arrow
 from terragrip.recording.schema import LABELS, TIME, is_channel
-from terragrip.thousands import complaint, is_grouped
+from terragrip.thousands import complaint, is_grouped, unit_in
 from terragrip.written_times import FORMS, doubt, times_of
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def parse(
     if not bytes(body[:1024]).strip() and not bytes(body).strip():
         return {names[k]: np.empty(0) for k in chosen}
     types = {_field(k): pa.float64() for k in chosen if _is_number_column(names[k], body, dialect, k)}
-    types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS}
+    types |= {_field(k): pa.string() for k in chosen if names[k] in LABELS or k in dialect.in_cells}
     try:
         table = _arrow(body, dialect, chosen, types)
         # Arrow takes 05:03, minutes and seconds, for hours and minutes
@@ -65,10 +65,14 @@ def parse(
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         texts = _arrow_of_texts(body, dialect, chosen, error, source, first)
         return {
-            names[k]: _numbers_of_texts(names[k], texts.column(_field(k)), dialect, source, first)
-            for k in chosen
+            names[k]: _numbers_of_texts(k, texts.column(_field(k)), dialect, source, first) for k in chosen
         }
-    result = {names[k]: from_arrow(names[k], table.column(_field(k)), source) for k in chosen}
+    result = {
+        names[k]: _numbers_of_texts(k, table.column(_field(k)), dialect, source, first)
+        if k in dialect.in_cells
+        else from_arrow(names[k], table.column(_field(k)), source)
+        for k in chosen
+    }
     return {name: _as_times(name, column) for name, column in result.items()}
 
 
@@ -142,10 +146,13 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
 
 
 def _numbers_of_texts(
-    name: str, column: pa.ChunkedArray, dialect: Dialect, source: str, first: int
+    index: int, column: pa.ChunkedArray, dialect: Dialect, source: str, first: int
 ) -> npt.NDArray[Any]:
     """Texts as numbers; a schema column raises InputError at the first that is none, another stays text."""
+    name = dialect.names[index]
     cells = [cell.strip() or None if cell is not None else None for cell in column.to_pylist()]
+    if index in dialect.in_cells:
+        cells = _without_unit(cells, dialect.in_cells[index], name, first, source)
     is_own = is_channel(name) or name == TIME
     times = times_of(cells) if name == TIME or not (is_own or name in LABELS) else None
     if times is not None:
@@ -163,6 +170,20 @@ def _numbers_of_texts(
         else:
             return np.array(cells, dtype=object)
     return result
+
+
+def _without_unit(cells: list[str | None], unit: str, name: str, first: int, source: str) -> list[str | None]:
+    """Cells without the unit that those of the first rows have; raises InputError at one with another."""
+    for row, cell in enumerate(cells):
+        own = unit_in(cell) if cell is not None else None
+        if own not in (None, unit):
+            raise InputError(
+                f"is in {own}, the first rows in {unit}",
+                file=source,
+                place=f"column {name}, row {first + row + 1}",
+                hint="write all in one unit",
+            )
+    return [cell.removesuffix(unit).strip() if cell is not None and unit_in(cell) else cell for cell in cells]
 
 
 def _number(cell: str | None) -> float | None:

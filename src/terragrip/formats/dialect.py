@@ -6,12 +6,12 @@ import csv
 import io
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice, zip_longest
 
 from terragrip.errors import InputError
 from terragrip.text import HEAD
-from terragrip.thousands import has_thousands
+from terragrip.thousands import has_thousands, unit_in
 from terragrip.units import is_common
 
 _SEPARATORS = (",", ";", "\t", "|")
@@ -25,13 +25,17 @@ _WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text table is written. ``separator`` " " stands for any run of blanks; ``start`` is where rows begin."""
+    """How a text table is written. ``separator`` " " stands for any run of blanks; ``start`` is where rows begin.
+
+    ``in_cells``: the columns whose numbers have their unit behind them, by place, and that unit, which is also in ``units``.
+    """
 
     separator: str
     decimal: str
     names: tuple[str, ...]
     units: dict[str, str]
     start: int
+    in_cells: dict[int, str] = field(default_factory=dict)
 
 
 def detect(data: bytes, source: str) -> Dialect:
@@ -82,7 +86,22 @@ def detect(data: bytes, source: str) -> Dialect:
         header.append("")
     names, notes = _names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
-    return Dialect(separator, decimal, names, {**notes, **units}, _after_lines(data, start, rows))
+    units = {**notes, **units}
+    in_cells = {
+        k: unit
+        for k, column in enumerate(
+            zip_longest(*(split(line, separator) for line in lines[rows:]), fillvalue="")
+        )
+        if k < len(names) and (unit := _unit_in_all(column)) and units.get(names[k], unit) == unit
+    }
+    units |= {names[k]: unit for k, unit in in_cells.items()}
+    return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells)
+
+
+def _unit_in_all(cells: tuple[str, ...]) -> str | None:
+    """The one unit that all numbers of a column have behind them."""
+    found = {unit_in(cell) for cell in cells if cell.lower() not in _EMPTY}
+    return found.pop() if len(found) == 1 else None
 
 
 def _under_groups(groups: list[str], lines: list[str], separator: str, decimal: str) -> list[str] | None:
