@@ -162,6 +162,10 @@ def test_a_receivers_velocities_in_the_plane_go_together() -> None:
         ("Radumfangsgeschwindigkeit [km/h]", "wheel_based_speed"),
         ("Getriebegeschwindigkeit [km/h]", None),
         ("Front axle torque [Nm]", None),
+        ("WS_FL [rpm]", "wheel_speed_fl"),
+        ("n_Motor_re [1/min]", "wheel_speed_r"),
+        ("I_Motor_li [A]", "drive_torque_l"),
+        ("p_FL [bar]", None),
     ],
 )
 def test_names_in_other_languages_and_paths(name: str, channel: str | None) -> None:

@@ -159,8 +159,10 @@ def _of_wheels(column: Column) -> list[Hint]:
         return [(f"drive_torque_{name.wheel}", 0.9 if name.has("wheel") else 0.8, "a torque and a wheel")]
     if name.has("current") or column.kind == "current":
         return [(f"drive_torque_{name.wheel}", 0.75, "a current and a wheel")]
-    turning = name.has("speed", "rotation") or (
-        name.has("wheel", "motor") and column.kind in ("speed", "rotation")
+    turning = (
+        name.has("speed", "rotation")
+        or (name.has("wheel", "motor") and column.kind in ("speed", "rotation"))
+        or (name.wheel[-1] in "lr" and column.kind == "rotation" and _in_turns(column.unit))  # WS_FL [rpm]
     )
     if not turning or (name.has("body") and name.wheel.isdigit()):
         return []
