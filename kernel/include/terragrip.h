@@ -282,7 +282,7 @@ typedef struct { /* spreads (1 SD) of constants that the data cannot determine; 
     tg_real drive_torque_gain_common; /* relative, all wheels together */
     tg_real drive_torque_offset;    /* N m, each wheel its own */
     tg_real drawbar_gain;           /* relative */
-    tg_real drawbar_offset;         /* N */
+    tg_real drawbar_offset;         /* N: of the zero; where none is measured (towing 0), of the pull itself */
     tg_real mass;                   /* relative, of what the loads come from: the machine's, or as it is measured */
     tg_real hitch_load_gain;        /* relative */
     tg_real hitch_load_offset;      /* N */
