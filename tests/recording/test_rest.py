@@ -85,3 +85,7 @@ def test_torques_that_read_the_same_in_every_stop_are_named() -> None:
     assert with_torque(1.0) == []
     assert with_torque(np.where(TIME < 80, 40.0, 30.0)) == []  # motors that hold it on two slopes
     assert with_torque(40.0, pitch=np.full(len(TIME), 0.1)) == []  # or on one, as measured
+    torque = np.where(standing, 0.0, 60.0)
+    one = {"drive_torque_l": torque, "drive_torque_r": torque - 9}  # 2 % of its load, 1 % of the weight
+    (note,) = torque_rest_warnings(Recording(TIME, {**stopping().channels, **one}), CART)
+    assert "(r -9 N m)" in note

@@ -26,6 +26,7 @@ _SURE = 4.0  # standard deviations at rest: noise without a sign has a mean of 1
 _ALIKE = 0.5  # of the shift, by which stops differ
 _HELD = 0.1  # of a torque, likewise: motors that hold a vehicle do so on one slope and another
 _THRUST = 0.01  # of the weight
+_ONE_WHEEL = 0.02  # of its share of it
 _SLOPE = 0.3  # of a thrust, that a measured slope explains
 
 
@@ -56,43 +57,47 @@ def rest_warnings(recording: Recording) -> list[str]:
 
 
 def torque_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence where the drive torques read one and the same thrust, not 0, in two long stops of all wheels or more.
+    """A sentence on drive torques that read one and the same value, not 0, in two long stops of all wheels or more.
 
     A motor that holds the vehicle reads as much as the slope asks for, which differs from stop to stop.
     """
-    torques = {w: recording.channels.get(f"drive_torque_{w}") for w in vehicle.wheels}
-    read = {
-        w: values - vehicle.drive_torque_offset[i]
-        for i, w in enumerate(torques)
-        if (values := torques[w]) is not None
-    }
+    measured = {w: recording.channels.get(f"drive_torque_{w}") for w in vehicle.wheels}
+    read = {w: values for w, values in measured.items() if values is not None}
     pitch = recording.channels.get("pitch", np.zeros(len(recording)))
     stops = [
-        ({w: float(np.mean(_known(values[stop]))) for w, values in read.items()}, _known(pitch[stop]))
+        stop
         for stop in _stops(recording)[0]
         if read and all(len(_known(values[stop])) >= _FEWEST for values in read.values())
     ]
     if len(stops) < 2:
         return []
-    weight, radius = GRAVITY * vehicle.mass, dict(zip(vehicle.wheels, vehicle.wheel_radius, strict=True))
-    thrusts = np.array([sum(mean / radius[w] for w, mean in stop.items()) for stop, _ in stops]) / weight
-    usual = median(thrusts)
-    off = (
-        len(read)
-        * (vehicle.uncertainty.drive_torque_offset or 0.0)
-        / median(np.array(vehicle.wheel_radius))
-        / weight
-    )
-    if not abs(usual) > max(_THRUST, _SURE * off) or np.max(np.abs(thrusts - usual)) > _HELD * abs(usual):
+    places = [vehicle.wheels.index(w) for w in read]
+    weight, radius = GRAVITY * vehicle.mass, vehicle.wheel_radius[places]
+    torques = np.array([[np.mean(_known(values[stop])) for values in read.values()] for stop in stops])
+    thrusts = (torques - vehicle.drive_torque_offset[places]) / radius / weight  # (stops, wheels)
+    climbs = np.array([np.sin(np.mean(tilt)) if len(tilt := _known(pitch[stop])) else 0.0 for stop in stops])
+    total, stated = thrusts.sum(axis=1), (vehicle.uncertainty.drive_torque_offset or 0.0) / radius / weight
+    share = (vehicle.axle_mass / vehicle.mass / np.bincount(vehicle.wheel_axle))[vehicle.wheel_axle[places]]
+    least = np.maximum(_ONE_WHEEL * share, _SURE * stated)
+    off = np.array([_is_off(own, limit) for own, limit in zip(thrusts.T, least, strict=True)])
+    off |= _is_off(total, max(_THRUST, _SURE * float(np.sqrt(np.sum(stated**2)))))
+    if off.all() and np.any(climbs / median(total) > _SLOPE):
         return []
-    if any(len(tilt) and np.sin(np.mean(tilt)) / usual > _SLOPE for _, tilt in stops):
+    if not off.any():
         return []
-    shown = ", ".join(f"{w} {median(np.array([stop[w] for stop, _ in stops])):.3g}" for w in read)
+    shown = ", ".join(f"{w} {median(torques[:, k]):.3g}" for k, w in enumerate(read) if off[k])
     return [
-        f"The drive torques read the same in {len(stops)} stops of all wheels ({shown} N m), {abs(usual):.2g} of the weight over the "
-        "radius: their zeros are off, and adhesion by as much, unless brakes hold against the drive. Of a hydraulic motor the difference "
-        "of its two pressures counts; else write 'offset:' for each in the profile."
+        f"The drive torques read the same in {len(stops)} stops of all wheels ({shown} N m), "
+        f"{median(np.abs(thrusts[:, off].sum(axis=1))):.2g} of the weight over the radius: their zeros are off, and adhesion by as much, "
+        "unless brakes hold against the drive. Of a hydraulic motor the difference of its two pressures counts; else write 'offset:' for "
+        "each in the profile."
     ]
+
+
+def _is_off(thrusts: Floats, least: float) -> bool:
+    """Whether thrusts over the weight (stops,) are much the same, and not 0."""
+    usual = median(thrusts)
+    return abs(usual) > least and float(np.max(np.abs(thrusts - usual))) <= _HELD * abs(usual)
 
 
 def _known(values: Floats) -> Floats:
