@@ -13,6 +13,7 @@ import pytest
 
 import terragrip as tg
 from terragrip.cli import main
+from terragrip.errors import InputError
 from terragrip.estimation.c_header import c_header, estimator_of
 from terragrip.estimation.engine import EVENTS
 
@@ -108,6 +109,19 @@ def test_a_turn_by_positions_is_refused(made: tuple[Path, tg.Estimates, tg.Recor
     turned = tg.estimate(tg.Recording.from_frame(frame), estimates.vehicle)
     with pytest.raises(tg.InputError, match="rate of turn from positions"):
         estimator_of(turned.about, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gap", "x"), ("noise", [1]), ("held", {"ground_speed": "x"}), ("channels", 3)]
+)
+def test_settings_changed_by_hand_are_named(
+    made: tuple[Path, tg.Estimates, tg.Recording], name: str, value: object
+) -> None:
+    about = made[1].about
+    with pytest.raises(InputError, match=f"e.parquet: has .* as its {name}; estimate the log again"):
+        estimator_of({**about, "settings": {**about["settings"], name: value}}, "e.parquet")
+    with pytest.raises(InputError, match="does not contain the vehicle and the method"):
+        estimator_of({key: about[key] for key in about if key != "method"}, "e.parquet")
 
 
 def test_numbers_come_back_to_the_last_bit(made: tuple[Path, tg.Estimates, tg.Recording]) -> None:

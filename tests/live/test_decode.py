@@ -12,7 +12,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.formats import Profile
-from terragrip.live.decode import Decoder
+from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.payload import Unreadable, from_json, unpacker
 
 PROFILE = {
@@ -67,6 +67,17 @@ def test_a_delay_makes_a_sample_of_its_own():
     profile = {"channels": {"ground_speed": {"from": "v", "delay": "50 ms"}, "wheel_speed_fl": {"from": "w"}}}
     result = Decoder(Profile.from_dict(profile)).samples({"time": 1.0, "v": 2.0, "w": 3.0})
     assert dict(result) == {0.95: {"ground_speed": 2.0}, 1.0: {"wheel_speed_fl": 3.0}}
+    # So too where the message has no stamp, as a receiver on a serial line.
+    result = Decoder(Profile.from_dict(profile)).samples({"v": 2.0, "w": 3.0}, arrival=1.0)
+    assert dict(result) == {0.95: {"ground_speed": 2.0}, 1.0: {"wheel_speed_fl": 3.0}}
+
+
+def test_a_delay_longer_than_rows_wait_is_refused(vehicle):
+    delayed = {"ground_speed": {"from": "v", "delay": "200 ms"}}
+    profile = Profile.from_dict({"channels": {**delayed, **{f"wheel_speed_{w}": w for w in vehicle.wheels}}})
+    with pytest.raises(InputError, match=r"channels\.ground_speed: has a delay of 200 ms.*--window 220"):
+        check_channels(profile, vehicle, 0.02)
+    check_channels(profile, vehicle, 0.22)
 
 
 def test_the_better_source_wins_once_it_speaks():

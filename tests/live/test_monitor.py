@@ -10,6 +10,7 @@ import pytest
 
 from machine import messages, running, until
 from terragrip.formats import Profile
+from terragrip.live.core import Core, Settings
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
@@ -17,6 +18,7 @@ from terragrip.live.monitor import _silent
 from terragrip.live.payload import unpacker
 from terragrip.live.pulse import Pulse
 from terragrip.live.service import Service
+from terragrip.live.statistics import Statistics
 
 pytestmark = pytest.mark.asyncio
 
@@ -197,3 +199,18 @@ async def test_a_slow_source_beside_a_fast_one_is_not_lost_between_its_messages(
         lost += [note for note in service.inbox.notes() if "event" in note]
     kinds = [(note["event"]["kind"], note["event"]["source"]) for note in lost]
     assert kinds.count(("source_lost", "udp://127.0.0.1:2")) == 1, kinds  # once the messages have ended
+
+
+async def test_a_source_of_one_message_a_second_is_not_lost_before_its_period_is_known(vehicle):
+    now, lost = [1000.0], []
+    box = Inbox(clock=lambda: now[0])
+    feed = Feed(0, "udp://a", Decoder(None), unpacker(None), box, after=0.0)
+    statistics = Statistics(Core(vehicle, Settings(("udp://a",))), box, [feed], [], True)
+    for tick in range(100):
+        now[0] = 1000.0 + 0.1 * tick
+        if tick in (5, 16, 26):
+            feed.fields({"time": now[0], "ground_speed": 1.0})
+            box.pop(1)
+        statistics.watch(now[0])
+        lost += [tick for note in box.notes() if "event" in note]
+    assert lost == [49]  # more than two periods after the last

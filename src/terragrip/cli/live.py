@@ -217,16 +217,10 @@ def _settings(path: Path | None) -> dict[str, Any]:
     if path is None:
         return {"noise": {}, "held": {}, "driveline": None}
     from terragrip.estimation import Estimates
+    from terragrip.estimation.provenance import settings_of
 
     about = Estimates.read_about(path)
-    known = about.get("settings", {})
-    if not {"noise", "held"} <= set(known):
-        raise InputError(
-            "contains no settings",
-            file=path,
-            place="--settings",
-            hint="estimate the log again with this version",
-        )
+    known = settings_of(about, path, place="--settings")
     driveline = about.get("driveline")
     if driveline is not None and "engine" not in driveline:
         driveline = None  # of an earlier version

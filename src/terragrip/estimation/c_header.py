@@ -15,6 +15,7 @@ from terragrip.errors import InputError
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.estimator import TractionEstimator
+from terragrip.estimation.provenance import settings_of
 from terragrip.estimation.settings import sample_slots
 from terragrip.vehicle import Vehicle
 
@@ -28,9 +29,10 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
     slip without torques, the torque of an engine or of a drive train, a turn by positions, smoothed ones; and where two columns' names
     are one in capitals.
     """
-    known = about.get("settings", {})
-    if not {"noise", "held", "channels"} <= set(known) or "vehicle" not in about:
-        raise InputError("contains no settings", file=file, hint="estimate the log again with this version")
+    known = settings_of(about, file, "channels", "gap", "standstill_speed")
+    hint = "estimate the log again with this version"
+    if "vehicle" not in about or "method" not in about:
+        raise InputError("does not contain the vehicle and the method", file=file, hint=hint)
     if about.get("smooth"):
         raise InputError(
             "is smoothed, and a controller knows no later samples",
@@ -59,7 +61,7 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
             )
     return TractionEstimator(
         vehicle,
-        about["method"],
+        str(about["method"]),
         sensors=known["noise"],
         held=known["held"],
         channels=known["channels"],

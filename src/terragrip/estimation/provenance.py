@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from terragrip.errors import InputError
 from terragrip.recording import unit_warnings
 from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
@@ -54,6 +57,30 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
         }
     plain: dict[str, Any] = json.loads(json.dumps(about))
     return plain
+
+
+def settings_of(
+    about: Mapping[str, Any], file: str | os.PathLike[str], *needed: str, place: str | None = None
+) -> dict[str, Any]:
+    """The settings that `about_run` wrote, to estimate by again; raises InputError where those ``needed`` are not all there and sound."""
+    known, hint = about.get("settings"), "estimate the log again with this version"
+    if not isinstance(known, dict) or not {"noise", "held"} <= set(known):
+        raise InputError("contains no settings", file=file, place=place, hint=hint)
+    for name in ("noise", "held", *needed):
+        value = known.get(name, "nothing")
+        if name == "channels":
+            sound = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        elif name in ("noise", "held"):
+            sound = isinstance(value, dict) and all(map(_is_number, value.values()))
+        else:
+            sound = value is None or _is_number(value)
+        if not sound:
+            raise InputError(f"has {str(value)[:40]} as its {name}", file=file, place=place, hint=hint)
+    return known
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, ...]:

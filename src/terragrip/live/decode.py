@@ -23,6 +23,7 @@ Sample = tuple[float | None, Values]
 
 _HUGE = 1e300
 _NAMES = 1000  # of fields, beyond which a sender makes them up
+_SPARE = 0.02  # s between a delay and the window that is advised for it
 
 
 _LAYOUTS = 256  # sets of fields whose plan is kept
@@ -76,8 +77,11 @@ class Decoder:
         """Whether the profile names a field."""
         return self.profile is not None and self.profile.wants(name)
 
-    def samples(self, fields: Mapping[str, Any]) -> list[Sample]:
-        """The samples of one message: one, or several where channels have delays of their own; none without a value."""
+    def samples(self, fields: Mapping[str, Any], arrival: float | None = None) -> list[Sample]:
+        """The samples of one message: one, or several where channels have delays of their own; none without a value.
+
+        ``arrival`` [s]: its stamp, where it holds none.
+        """
         if self.profile is None:
             return self._plain(fields)
         rows = self.profile.rows
@@ -100,6 +104,8 @@ class Decoder:
         if not by_delay:
             return []
         stamp = self._stamp(fields)
+        if stamp is None:
+            stamp = arrival
         return [(None if stamp is None else stamp - delay, values) for delay, values in by_delay.items()]
 
     def _plan(self, layout: tuple[str, ...]) -> list[_Step]:
@@ -254,11 +260,29 @@ def _refuse_looking_ahead(name: str, source: Source) -> None:
         )
 
 
-def check_channels(profile: Profile, vehicle: Vehicle) -> None:
-    """Raise InputError where the profile lacks what the filter cannot do without.
+def _refuse_late(profile: Profile, window: float) -> None:
+    """A channel whose delay is longer than the window comes when the rows of its instants are gone: always."""
+    delays = {
+        name: one.delay
+        for name, source in profile.channels.items()
+        if name not in LABELS
+        for one in source.chain
+    }
+    latest = max(delays, key=lambda name: delays[name], default="")
+    if latest and (more := delays[latest] - min(delays.values())) >= window:
+        raise InputError(
+            f"has a delay of {1000 * delays[latest]:.4g} ms, and rows wait for {1000 * window:.4g} ms: all its samples would be late",
+            place=f"channels.{latest}",
+            hint=f"give --window {math.ceil(1000 * (more + _SPARE)):d}",
+        )
+
+
+def check_channels(profile: Profile, vehicle: Vehicle, window: float) -> None:
+    """Raise InputError where the profile lacks what the filter cannot do without, or a delay is longer than rows wait: ``window`` [s].
 
     Without any torque slip alone is estimated: of the wheels that have a speed, or of the drive train as one.
     """
+    _refuse_late(profile, window)
     if speeds_alone(profile.channels, vehicle):
         return
     needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]

@@ -73,7 +73,9 @@ class Feed:
     def fields(self, fields: Mapping[str, Any], arrival: float | None = None) -> None:
         """A message as named fields."""
         self.messages += 1
-        samples = self.decoder.samples(fields)
+        if arrival is None:
+            arrival = self.inbox.clock()
+        samples = self.decoder.samples(fields, arrival)
         for stamp, values in samples:
             self.inbox.put(self.index, stamp, values, arrival)
         if self.decoder.unreadable:

@@ -57,13 +57,13 @@ class Service:
             raise InputError(
                 "there is no source", place="--source", hint="name one, e.g. udp://127.0.0.1:9870"
             )
+        options = options or Options()
         decoders = [Decoder(profile) for _ in sources]
         opened = [open_source(text, decoder) for text, decoder in zip(sources, decoders, strict=True)]
         self.source_names = [uri.name for uri, _ in opened]
         self.sources: list[Source] = [source for _, source in opened]
         if profile is not None:
-            check_channels(profile, vehicle)
-        options = options or Options()
+            check_channels(profile, vehicle, options.window)
         channels = [
             name
             for decoder, source in zip(decoders, self.sources, strict=True)

@@ -17,6 +17,7 @@ from terragrip.recording.columns import SINCE_1970
 
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
+_UNKNOWN = 3.0  # s, before a second message has shown the period
 _EVERY = 5.0  # s between two events that estimates are behind
 _TURNING = ("wheel_speed_", "wheel_based_speed", "engine_speed")
 
@@ -107,7 +108,7 @@ class Statistics:
                 feed.connected("it sends again")
         elif not feed.is_lost and not pulse.is_silent:
             silence = pulse.silence(now)
-            if silence > max(_SILENT, 10.0 * self.period, 2.0 * pulse.period):
+            if silence > max(_SILENT if pulse.period else _UNKNOWN, 10.0 * self.period, 2.0 * pulse.period):
                 pulse.is_silent = True
                 feed.lost(f"{feed.excuse_at(now) or 'nothing came'} for {silence:.1f} s")
 

@@ -192,7 +192,7 @@ class Vehicles:
         self.roster.refresh()
         entry = self.roster.of(name)
         if entry.profile is not None:
-            check_channels(entry.profile, entry.vehicle)
+            check_channels(entry.profile, entry.vehicle, self._options.window)
         decoders = [Decoder(entry.profile) for _ in self._topics]
         channels = [
             channel for decoder in decoders for channel in self._options.promised(decoder, entry.vehicle)
