@@ -4,10 +4,10 @@
 
 The limits are those of recording/codes.py, pace.py, frozen.py, cut.py, turns.py, dropouts.py, stretches.py, copies.py, replays.py,
 rest.py, torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART and _SPUN,
-torques.py's least thrust, those of level_shift.py, rescaled.py and leaps.py, and the stretch of mechanics.py. Right logs are development
-drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and the measured logs of ../shared/data;
-a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques without a sign into all logs that
-have negative ones); one is found where its own note comes.
+torques.py's least thrust, plain_units.py's hour, those of level_shift.py, rescaled.py and leaps.py, and mechanics.py's stretch and
+offset. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
+the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques
+without a sign into all logs that have negative ones); one is found where its own note comes.
 
 --write puts the table into docs/checks.md.
 """
@@ -50,16 +50,17 @@ LIMITS = {
     "rest": "_STILL _ROLLING_OUT _SHIFT _SURE _ALIKE",
     "replays": "_CHANNELS _CHANGES",
     "torques": "_LEAST",
-    "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _ALONE _SURE _ALIKE _ACCELERATION _FORCE",
+    "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _STARTS _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
-    "torque_signs": "_MOVING _STEADY _BRAKING _FEWEST _AS_HARD",
+    "torque_signs": "_MOVING _STEADY _NEAR _DIPS _BRAKING _FEWEST _AS_HARD",
     "pitch": "_LONG _MOVED _BEYOND",
     "level_shift": "_STAYS",
     "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
     "leaps": "_LEAST _BEYOND _SURE _HALF _REST",
-    "mechanics": "_STRETCH",
+    "mechanics": "_STRETCH _OFFSET",
+    "plain_units": "_ON_TIME",
     "sides": "_APART _SPUN",
-    "rolling": "_PULLING _MOST _RADII_SURE _SLOWER_LEAST",
+    "rolling": "_LIGHT _TYRE _LIGHTEST _PULLING _MOST _RADII_SURE _SLOWER_LEAST",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
 SHARES = {
@@ -205,6 +206,13 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         vehicle,
     )
     yield "radii 8 % small", "slower than the ground", log, with_radii(vehicle, 0.92)
+    yield "radii 6 % large", "With hardly a torque", log, with_radii(vehicle, 1.06)
+    yield (
+        "summer time",
+        "summer time",
+        replace(log, time=np.where(time > middle, time + 3600.0, time)),
+        vehicle,
+    )
     zeros = np.random.default_rng(5).random(len(log)) < 0.03
     yield (
         "zeros in the speed",
@@ -220,6 +228,12 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
             "accelerometer's zero moved .3",
             "zero of one of the two moved",
             changed(log, "acceleration_x", by=lambda v: np.where(time > middle, v + 0.3, v)),
+            vehicle,
+        )
+        yield (
+            "accelerometer .5 off",
+            "its bias or its mounting",
+            changed(log, "acceleration_x", by=lambda v: v + 0.5),
             vehicle,
         )
     first = f"wheel_speed_{vehicle.wheels[0]}"
@@ -250,6 +264,8 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         changed(log, "drive_torque", by=lambda v: np.where(time > middle, 0.5 * v, v)),
         vehicle,
     )
+    pounds = changed(log, "drive_torque", by=lambda v: v / 1.356)
+    yield "torques in lbf ft", "In starts and stops", pounds, vehicle
     if "drawbar_force" in log.channels:
         drift = 0.2 * vehicle.mass * STANDARD_GRAVITY * (time - time[0]) / (time[-1] - time[0])
         yield (

@@ -119,6 +119,18 @@ def test_which_of_three_is_off_is_named(name: str, factor: float, cause: str, se
     assert cause in note
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_torques_in_pound_feet_are_named_where_nothing_is_towed(seed: int) -> None:
+    """Given as N m they are .74 of what starts and stops need. Too large ones may pull a trailer that is not in the log."""
+    columns = drive(seed)
+    rigid = {n: v for n, v in columns.items() if n != "drawbar_force"}
+    rigid |= {n: v - RADIUS * columns["drawbar_force"] / 4 for n, v in rigid.items() if "torque" in n}
+    assert notes(rigid, machine()) == []
+    assert notes(times(rigid, "drive_torque", 1.5), machine()) == []
+    (note,) = notes(times(rigid, "drive_torque", 1 / 1.356), machine())
+    assert "times the force that moves 600 kg: check the torques' scale" in note
+
+
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize(("factor", "cause"), [(-1.0, "its opposite"), (1 / G, "it may be in g")])
 def test_an_accelerometer_needs_no_torque_to_be_wrong(factor: float, cause: str, known: bool) -> None:

@@ -209,3 +209,10 @@ def test_a_drive_in_which_everything_rises_is_no_logger_that_hung() -> None:
     rising = {n: np.where(rows, v[rows][0] + 0.05 * (TIME - 20), v) for n, v in pulling().channels.items()}
     rising["ground_speed"] = np.where(stands, 0.0, rising["ground_speed"])
     assert frozen_warnings(pulling(**rising)) == []
+
+
+def test_a_torque_in_coarse_steps_keeps_its_value_by_them() -> None:
+    """Steps of 12 N m, where it is 140: held for long beside a pull that changes, it was "not measured", without a fault."""
+    calm = np.where(abs(TIME - 100) < 20, 110.0, 100 + 40 * np.sin(TIME / 3))
+    noisy = calm + np.random.default_rng(3).standard_normal(len(TIME))
+    assert frozen_warnings(pulling(drive_torque_l=np.round(noisy / 12) * 12)) == []

@@ -235,7 +235,9 @@ def test_a_drawbar_force_of_one_value_is_named() -> None:
     assert "drawbar_force is 40 N in all rows: a cell's zero with nothing towed" in notes
 
 
-@pytest.mark.parametrize(("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.4, "")])
+@pytest.mark.parametrize(
+    ("bias", "expected"), [(1.0, "reads 1"), (-1.0, "reads -0.9"), (0.45, "reads 0.5"), (0.25, "")]
+)
 def test_an_accelerometer_that_is_tilted_is_named(bias: float, expected: str) -> None:
     columns = drive()
     notes = notes_on({**columns, "acceleration_x": columns["acceleration_x"] + bias})
@@ -250,7 +252,7 @@ def test_radii_that_are_exchanged_are_named_and_slip_is_not() -> None:
         "rear": {"mass": 450, "wheels": ["rl", "rr"]},
     }
     assert "The rims of the axle front go 1.29 times" in notes_on(drive(), machine(axles=axles))
-    assert notes_on(scaled(drive(), {"wheel_speed_f": 1.1})) == ""
+    assert "the axle" not in notes_on(scaled(drive(), {"wheel_speed_f": 1.1}))
 
 
 @pytest.mark.parametrize(("run", "seed"), [("hard-09", 0), ("fine-09", 0), ("fine-08", 1)])

@@ -291,8 +291,8 @@ LIGHT = 0.12 * RADIUS * MASS * G / 4  # N m that no ground lets a wheel slip by
     [
         (1.0, 0.5, False),
         (0.72, 0.5, False),  # rolls .28 too little
-        (0.68, 0.5, True),
-        (0.68, 0.95, True),
+        (0.6, 0.5, True),
+        (0.58, 0.95, True),  # .42, where a torque of .114 of the load may slip it by as much
         (0.68, 1.05, False),  # a torque that may slip it
         (0.68, -0.95, True),
         (1.28, 0.5, False),

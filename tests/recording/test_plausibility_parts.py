@@ -66,6 +66,19 @@ def test_a_time_of_day_written_as_hhmmss_is_named(vehicle: Vehicle, step: float)
     assert "written as hhmmss" not in said(vehicle, time=of_day, **channels)
 
 
+def test_a_clock_set_to_summer_time_is_named_where_everything_goes_on(vehicle: Vehicle) -> None:
+    """A logger that was off for an hour, and one whose machine meanwhile stood elsewhere, are left alone."""
+    time = 0.1 * np.arange(3000)
+    speed = 1 + 0.2 * np.sin(time)
+    channels = {"ground_speed": speed} | {f"wheel_speed_{w}": speed / RADIUS for w in vehicle.wheels}
+    later = time >= 100
+    assert "set to summer time? Write times in UTC, or subtract 3600 s" in said(
+        vehicle, time=time + 3600 * later, **channels
+    )
+    assert "summer" not in said(vehicle, time=time + 3610 * later, **channels)
+    assert "summer" not in said(vehicle, time=time + 3600 * later, **channels, latitude=50 + 0.2 * later)
+
+
 def test_where_two_units_give_one_ratio_both_are_named(vehicle: Vehicle) -> None:
     """Rims of .165 m in m/s turn as many times too slowly as rims in revolutions per second: the slip decides between them."""
     wheel = {"radius": 0.165, "inertia": 0.27}

@@ -112,6 +112,20 @@ def test_the_inner_rims_of_a_bend_that_only_the_rims_show_are_no_error(
     )
 
 
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (1.06, True), (1.15, True), (0.98, False)])
+def test_rims_that_are_faster_than_their_hubs_while_they_brake_are_named(
+    columns: dict[str, np.ndarray], vehicle: Vehicle, factor: float, said: bool
+) -> None:
+    """A brake makes them slower: the radius is too large, or the gear ratio wrong. Slip was .05 too large, without a word."""
+    braked = {n: -0.2 * v if n.startswith("drive_torque") else v for n, v in columns.items()}
+    braked |= {n: 0.92 * v for n, v in columns.items() if n.startswith("wheel_speed")}
+    braked["drawbar_force"] = -0.2 * columns["drawbar_force"]
+    data = vehicle.to_dict()
+    data["wheel"]["radius"] *= factor
+    notes = unit_warnings(Recording.from_frame(braked), Vehicle.from_dict(data))
+    assert any("With hardly a torque the wheels fl, fr, rl, rr slip by" in note for note in notes) is said
+
+
 @pytest.mark.parametrize("torque", [0.5, 0.0, -2.0])
 def test_rims_that_go_slower_by_a_torque_of_hardly_anything_are_no_error(
     columns: dict[str, np.ndarray], vehicle: Vehicle, torque: float

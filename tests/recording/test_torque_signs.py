@@ -61,8 +61,16 @@ def test_torques_without_a_sign_are_named(case: dict[str, float]) -> None:
     assert note in notes
 
 
-def test_where_nothing_brakes_a_size_is_the_torque() -> None:
-    assert notes_on(unsigned(drive(stop=8.0))) == []
+def test_noise_that_turns_back_at_0_shows_a_missing_sign_where_nothing_brakes() -> None:
+    """At rest. Torques that stay above 0, such as an idle drive's, and those that a logger cuts at 0 do not turn back there."""
+    gentle = drive(stop=8.0)
+    (note,) = notes_on(unsigned(gentle))
+    assert (
+        "times they fall to 0 from one sample to the next and rise again as far: the torques have no sign"
+        in note
+    )
+    for other in (lambda v: np.abs(v) + 8.0, lambda v: np.maximum(v, 0.0)):
+        assert notes_on({n: other(v) if n.startswith("drive_torque") else v for n, v in gentle.items()}) == []
 
 
 def test_brakes_that_the_torques_do_not_see_are_no_missing_sign() -> None:

@@ -28,7 +28,7 @@ _MOVING = 0.1  # of the speed that a twentieth of the drive exceeds
 _SLIP = 0.3  # beyond, resistance grows with the pull
 _LEAST = 40.0  # s of driving: in 22 s one start outweighs all blocks (a right log in 531 was named)
 _BLOCKS = 12  # for the jackknife
-_ALONE = 0.8  # share of the rims' change in one block: a single start has no scatter
+_STARTS = 2.5  # blocks among which the rims' change is spread, by its squares: a start or two have no scatter
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
 _ACCELERATION = 1.8  # against both the ground's and the rims' rate
@@ -113,7 +113,7 @@ class Courses:
         shown = quick(calm(at("acceleration_x"))) if _known(recording, "acceleration_x") else None
         thrust = pull = None
         torques = [f"drive_torque_{w}" for w in radii]
-        if vehicle is not None and _known(recording, "drawbar_force", *torques):
+        if vehicle is not None and torques and _known(recording, *torques):
             spun = sum(
                 float(inertia) / radius**2 * on
                 for inertia, radius, on in zip(
@@ -122,7 +122,8 @@ class Courses:
             )
             force = calm(np.sum([at(f"drive_torque_{w}") / r for w, r in radii.items()], axis=0))
             thrust = quick((force - spun * rate) / vehicle.mass)
-            pull = quick(calm(at("drawbar_force")) / vehicle.mass)
+            if _known(recording, "drawbar_force"):
+                pull = quick(calm(at("drawbar_force")) / vehicle.mass)
         return cls(quick(rate), quick(change), shown, thrust, pull)
 
     def slopes(self, y: Floats, x: Floats, *beside: Floats) -> list[Range]:
@@ -140,7 +141,8 @@ class Courses:
             ]
         )
         whole = sums.sum(axis=0)
-        if np.max(np.bincount(block, self.rims**2)) > _ALONE * np.sum(self.rims**2):
+        spread = np.bincount(block, self.rims**2)
+        if np.sum(spread) ** 2 < _STARTS * np.sum(spread**2):
             return unknown
         tables = np.concatenate([whole[None], whole - sums])
         if not (np.linalg.matrix_rank(tables[..., :-1]) == len(inside)).all():
@@ -168,32 +170,42 @@ def acceleration_warnings(courses: Courses | None) -> list[str]:
 
 
 def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
-    """A sentence on torques, drawbar force and mass that contradict each other, and which of them may be wrong."""
-    if courses is None or courses.thrust is None or courses.pull is None:
+    """A sentence on torques, drawbar force and mass that contradict each other, and which of them may be wrong.
+
+    Without a drawbar force a trailer that is not logged only adds to what the torques have to move: they are too small by accelerometer
+    and ground speed, or nothing is said.
+    """
+    if courses is None or courses.thrust is None:
         return []
-    change = (
-        courses.rims if courses.shown is None else courses.shown
-    )  # a receiver filters, and its speed is late
+    # a receiver filters, and its speed is late
+    change = courses.rims if courses.shown is None else courses.shown
+    scale = "the torques' scale (at the wheel, not at the motor: the gear ratio counts) and the wheel radius"
+    if courses.pull is None:
+        fits = [courses.slopes(courses.thrust, own)[0] for own in (change, courses.change)]
+        little = all(mass.high < 1 / _FORCE for mass in fits)
+        return [_imbalance(fits[0], "", [scale, "the mass"], vehicle)] if little else []
     mass, pull = courses.slopes(courses.thrust, change, courses.pull)
     if not (mass.is_off(_FORCE) or pull.is_off(_FORCE)):
         return []
     causes = []
     if max(mass.low, pull.low) <= min(mass.high, pull.high):
-        causes.append(
-            "the torques' scale (at the wheel, not at the motor: the gear ratio counts) and the wheel radius"
-        )
+        causes.append(scale)
     if pull.holds_one:
         causes.append("the mass")
     if mass.holds_one:
         causes.append("the scale of drawbar_force")
     if not causes:  # on hills that nothing measures a trailer pulls as the slope does
         return []
+    return [_imbalance(mass, f", and by {pull.value:.2g} times the drawbar force", causes, vehicle)]
+
+
+def _imbalance(mass: Range, beside: str, causes: list[str], vehicle: Vehicle) -> str:
     if mass.high < 1:
-        causes.append("brakes that the torques do not contain")
-    return [
+        causes = [*causes, "brakes that the torques do not contain"]
+    return (
         f"In starts and stops the drive torques over the wheel radius change by {mass.value:.2g} times the force that moves "
-        f"{vehicle.mass:.4g} kg, and by {pull.value:.2g} times the drawbar force: check {', or '.join(causes)}."
-    ]
+        f"{vehicle.mass:.4g} kg{beside}: check {', or '.join(causes)}."
+    )
 
 
 def _known(recording: Recording, *names: str) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _TIMES = 20.0  # ... and of its usual repetition
 _CHANGED = 0.2  # of the others' speed that a twentieth of the drive exceeds: what they change meanwhile
-_COARSE = 0.1  # of the size of a channel: larger steps hide the changes
+_COARSE = 0.1  # of the size of a speed: larger steps hide the changes; of a force, which follows the ground, half of it
 _SEVERAL = 4  # channels
 _OFTEN = 5  # short runs of one value,
 _SECOND, _RUN = 1.0, 10.0  # each of these seconds and times its usual repetition at least
@@ -153,15 +153,13 @@ def _repeats(
     lasting = when[last] - when[first]
     usual = median(np.diff(when[first])) if len(first) > 2 else np.inf
     step, size = quantum(what), quantile(np.abs(what), 0.95)
+    if forces and step > _COARSE / 2 * size:
+        return []
     if step > _COARSE * size > 0.0 and _by_steps(what, step):
-        return (
-            []
-            if forces
-            else [
-                f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
-                "one value. Log it in finer steps."
-            ]
-        )
+        return [
+            f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
+            "one value. Log it in finer steps."
+        ]
     usable = what[first] != 0.0
     if forces and name != "drawbar_force":  # a motor is held at its limit, a load cell never
         usable &= (what[first] > what.min()) & (what[first] < what.max())

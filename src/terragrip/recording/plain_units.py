@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _EMPTY = 0.5  # of the vehicle file's mass: few machines are so much lighter without their load
 _ENOUGH = 4000  # rows that show how far rows are apart
+_HOUR, _ON_TIME = 3600.0, 3.0  # s, and times the usual distance of rows: no pause lasts for just an hour
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 
 
@@ -57,7 +58,7 @@ def mass_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
 
 def spacing_warnings(recording: Recording) -> list[str]:
-    """Rows that are further apart, or closer, than those of a drive, and a time written as hhmmss."""
+    """Rows that are further apart, or closer, than those of a drive, a time written as hhmmss, and a clock set to summer time."""
     if len(recording) < 10:
         return []
     step = np.diff(recording.time)
@@ -67,12 +68,24 @@ def spacing_warnings(recording: Recording) -> list[str]:
             "time is a time of day written as hhmmss: 59 is followed by 100. Write it as 10:00:00.5, or as seconds; "
             "every time, distance and gap is wrong now."
         ]
+    hour = np.flatnonzero((step > _HOUR) & (step <= _HOUR + _ON_TIME * spacing))
+    if len(hour) == 1 and spacing < _SPARSE and _goes_on(recording, int(hour[0])):
+        return [
+            f"time leaps by an hour from {recording.time[hour[0]]:.10g} s to the next row: was the clock set to summer time? Write times "
+            "in UTC, or subtract 3600 s from there on; now nothing is known for an hour."
+        ]
     mean = float(recording.time[-1] - recording.time[0]) / len(
         step
     )  # instants of two clocks may be close by chance
     if spacing < _SPARSE and mean > _DENSE:
         return []
     return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]
+
+
+def _goes_on(recording: Recording, row: int) -> bool:
+    """Whether no channel changes more from a row to the next than from any other one."""
+    changes = [np.abs(np.diff(values)) for values in recording.channels.values()]
+    return not any(own[row] > np.nanmax(np.delete(own, row), initial=0.0) for own in changes)
 
 
 def _is_written_as_hhmmss(time: Floats, spacing: float) -> bool:

@@ -30,7 +30,7 @@ from terragrip.recording.replays import replay_warnings
 from terragrip.recording.rescaled import rescaled_warnings
 from terragrip.recording.rest import rest_warnings, torque_rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
-from terragrip.recording.rolling import slower_warnings
+from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.speed_ratios import drive_train_warnings, rim_warnings
 from terragrip.recording.torque_signs import sign_warnings
@@ -173,7 +173,7 @@ _EACH = (
     ),
     Check("angles", lambda log: angle_warnings(log.whole), _WAY, needs_wheels=False),
     Check("gravity", lambda log: gravity_warnings(log.rows), _WAY, needs_wheels=False),
-    Check("signs", lambda log: sign_warnings(log.rows, log.vehicle), _WAY),
+    Check("signs", lambda log: sign_warnings(log.whole, log.vehicle), _WAY),
     Check(
         "motion",
         lambda log: motion_warnings(log.rows, log.any_vehicle, log.means, log.thrusts),
@@ -197,6 +197,11 @@ _EACH = (
         "shortfall",
         lambda log: shortfall_warnings(log.rows, log.means, log.thrusts),
         (*_COURSES, *_FORCES, "torques", "balance"),
+    ),
+    Check(
+        "light",
+        lambda log: light_warnings(log.rows, log.vehicle, log.means),
+        (*_SPEEDS, *_FORCES, "torques", "balance", "slower"),
     ),
     Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
     Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means, log.thrusts), _WAY),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import side_differences, straight_rows
@@ -17,7 +18,6 @@ from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from terragrip.arrays import Floats
     from terragrip.recording.mechanics import Means
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
@@ -26,8 +26,10 @@ RATIOS = (0.6, 2.2)
 """Rim speed over ground speed that may still be slip; beyond it is a unit."""
 
 _LEAST = 25  # windows
-_LIGHT = 0.12  # adhesion: below it, no ground lets a wheel slip by
-_SPIN = 0.3  # (that is a stiffness of .4, where the softest soils have 2)
+_LIGHT = 0.12  # adhesion: below it a wheel slips by no more than its adhesion (a stiffness of 1, where the softest soils have 2) and
+_RADIUS = 0.3  # a mistake that the torques' balance would be blamed for, or
+_TYRE = 0.03  # what is left where they are right (right logs: -.001 at most)
+_LIGHTEST = 15  # windows, or a tenth of these
 _PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
 _MOST = 0.75  # of the windows with such a thrust
 _RADII = 0.01  # radii that are known so well are right
@@ -39,21 +41,45 @@ _RADII_SURE, _SLOWER_LEAST = (
 
 
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
-    """Slip with hardly any torque, and none with much; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
-    return _free(recording, vehicle, means) or _against_the_pull(recording, vehicle, means)
+    """Much slip with hardly any torque, and none with much; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
+    return light_warnings(recording, vehicle, means, _RADIUS) or _against_the_pull(recording, vehicle, means)
 
 
-def _free(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
-    load = vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+def light_warnings(
+    recording: Recording, vehicle: Vehicle, means: Means | None, least: float = _TYRE
+) -> list[str]:
+    """A sentence on rims that go faster than their hubs, straight ahead, where they hardly pull, or brake: by ``least`` of their speed more
+    than the softest ground explains, or slower by `_RADIUS`, in the lightest windows of an axle, left and right together (exchanged torques
+    oppose their slips).
+
+    Torques that are too small look the same."""
+    if means is None:
+        return []
+    radii, share = vehicle.driven_radii, vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
+    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
     off: dict[str, float] = {}
-    for wheel, radius in vehicle.driven_radii.items():
-        torque, rolled = recording.channels.get(f"drive_torque_{wheel}"), _rolled(recording, wheel, means)
-        if rolled is None or torque is None:
+    for axle in vehicle.axles.values():
+        ways, pulls = dict[str, Floats](), list[Floats]()
+        for wheel in [w for w in axle.wheels if w in radii]:
+            torque, way = recording.channels.get(f"drive_torque_{wheel}"), _rolled(recording, wheel, means)
+            if torque is not None and way is not None:
+                ways[wheel] = way / radii[wheel]
+                pulls.append(means.of(torque) / (radii[wheel] * share))
+        if not ways:
             continue
-        light = (np.abs(means.of(torque)) < _LIGHT * radius * load) & np.isfinite(rolled)
-        shown = median(rolled[light]) if light.sum() >= _LEAST else radius
-        if abs(1 - shown / radius) > _SPIN and RATIOS[0] <= radius / shown <= RATIOS[1]:
-            off[wheel] = shown
+        slip, adhesion = 1 - np.mean(list(ways.values()), axis=0), np.mean(pulls, axis=0)
+        rows = np.flatnonzero((adhesion < _LIGHT) & np.isfinite(slip) & straight)
+        rows = rows[np.argsort(adhesion[rows])[: max(_LIGHTEST, len(rows) // 10)]]
+        faster = slip - np.maximum(adhesion, 0.0)
+        slower = np.where(adhesion > -_LIGHT, -slip - _RADIUS + least, -np.inf)
+        if len(rows) < _LIGHTEST or quantile(np.maximum(faster, slower)[rows], 1 - _MOST) <= least:
+            continue
+        shown = {wheel: median(way[rows]) for wheel, way in ways.items()}
+        off |= {
+            w: way * radii[w]
+            for w, way in shown.items()
+            if abs(1 - way) > least and RATIOS[0] <= 1 / way <= RATIOS[1]
+        }
     if not off:
         return []
     apparent, stated = (
@@ -63,7 +89,7 @@ def _free(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     return [
         f"With hardly a torque the wheels {', '.join(off)} slip by {1 - apparent / stated:.2f}, more than any ground allows: they roll "
         f"{apparent:.3g} m per radian, but the stated radius is {stated:.3g} m. Check the radius (not the diameter), the gear ratio and "
-        "the ticks per turn."
+        "the ticks per turn, then the torques' scale; 'terragrip calibrate' finds the radii."
     ]
 
 

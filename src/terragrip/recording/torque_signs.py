@@ -2,7 +2,8 @@
 
 Converters that log the size of a current, and meters of power, have no sign. The wheels' thrust is the pull, the force that moves the mass,
 and a resistance (physics.md 1). Where the first two show that the wheels must brake, a thrust of that size with the other sign closes the
-balance, and the logged one does not.
+balance, and the logged one does not. Where noise, or a change of direction, takes a torque through 0, one without a sign turns back
+there, as often in a narrow band beside 0 as in the next one, where a torque that is never negative by nature hardly comes.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from terragrip.arrays import Floats
+    from terragrip.arrays import Floats, Ints
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
@@ -27,11 +28,14 @@ _LEAST = 20  # windows in motion
 _STEADY = 0.1  # m/s²: a vehicle that slows down less than that does not brake
 _BRAKING = 0.3  # m/s² of braking thrust over the mass: more than offset of torques and grade make
 _FEWEST = 4  # such windows
+_NEAR = 0.1  # of the smaller neighbour: a dip to 0, as often as to the band beside it
+_DIPS = 12  # (right logs moved up until none is negative: 10)
 _AS_HARD = 0.5  # of the braking thrust, with the other sign: a motor that is off while another brake works has none of it
 
 
 def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence where no torque is ever below 0 and the motion shows that the wheels braked, or drove backward, as hard as they pulled."""
+    """A sentence where no torque is ever below 0 and they turn back at 0, or the motion shows that the wheels braked, or drove backward, as
+    hard as they pulled."""
     radii, channels = vehicle.driven_radii, recording.channels
     names = [f"drive_torque_{wheel}" for wheel in radii]
     ground = channels.get("ground_speed")
@@ -39,6 +43,12 @@ def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return []
     if min(float(np.nanmin(channels[name], initial=0.0)) for name in names) < 0.0:
         return []
+    dips = np.sum([_dips(channels[name]) for name in names], axis=0)
+    if dips[0] >= _DIPS and dips[0] > max(dips[1] / 2, dips[2]):
+        return [
+            f"{', '.join(names)} are never below 0, but {dips[0]} times they fall to 0 from one sample to the next and rise again as far: "
+            "the torques have no sign. Log them with it (against the forward direction negative)."
+        ]
     known = recording.time[np.isfinite(ground)]
     if len(known) < _LEAST or np.any(np.diff(recording.time) < 0):
         return []
@@ -76,3 +86,18 @@ def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         f"{', '.join(names)} are never below 0, but for {when:.3g} s the wheels brake or drive backward by the motion, as hard as these "
         "say that they pull: the torques have no sign. Log them with it (against the forward direction negative)."
     ]
+
+
+def _dips(values: Floats) -> Ints:
+    """How often a torque (n,) that is never negative dips between two samples to within `_NEAR` of 0, to as far beyond, and to 0 itself, as
+    one does that is cut there."""
+    known = values[np.isfinite(values)]
+    known = known[np.flatnonzero(np.diff(known, prepend=np.nan))]  # each value once, however long it is held
+    inner, least = known[1:-1], _NEAR * np.minimum(known[:-2], known[2:])
+    return np.array(
+        [
+            np.sum((inner > 0) & (inner < least)),
+            np.sum((inner >= least) & (inner < 2 * least)),
+            np.sum(inner == 0),
+        ]
+    )
