@@ -213,6 +213,19 @@ def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
     )
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_soil_whose_strength_comes_and_goes_everywhere_has_no_anomalies(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    waves = rng.normal(0, 1 / 8, (60, 2)), rng.uniform(0, 6.3, 60)
+
+    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
+        return np.exp(0.022 * own)
+
+    made = map_of([("a", drive(*lanes(20, 50, 1), a=ground, noise=0.01, seed=seed))])
+    assert not made.anomalies["adhesion"]
+
+
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_strip_of_another_soil_along_the_edge_is_no_patch(seed: int) -> None:
     rng = np.random.default_rng(seed)

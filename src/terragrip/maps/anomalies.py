@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import compress
 from typing import Any
@@ -27,12 +28,20 @@ FALSE_DISCOVERIES = 0.05
 """Share of what is listed that may be chance (Benjamini and Hochberg 1995)."""
 LEAST_CELLS = 2
 """Cells that a patch has at least."""
+PLACES = 300
+"""Discs elsewhere on the map that a patch is compared with."""
+FREE = 0.25
+"""Share of such a disc's cells that may be of patches."""
+ROUND = 1.6
+"""Radii of a disc, beside a cell, to which its cells reach at most; those at the field's edge are cut off."""
+MEDIAN = 0.6745
+"""Median size of a Gaussian variable of SD 1."""
 
 
 @dataclass(frozen=True)
 class Anomaly:
     """A patch unlike its surroundings: ``cells`` (indices), centre ``column``, ``row`` (in cells), its ``value``, the value ``around``
-    nearest to it, the ``difference`` with its ``std``, and ``p``: the smallest of its cells, or that of the difference if larger."""
+    nearest to it, the ``difference`` with its ``std``, and ``p``: how many patches as large and strong chance makes on such a map."""
 
     cells: Ints
     column: float
@@ -50,8 +59,8 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     A cell's residual is its distance beyond the medians of its surroundings on each side. Residuals of neighbours are combined by inverse
     variance; what each constant weighs more in them than around is added to it. The null is the scatter of such scores about the nearest
     of those medians (their 68 % quantile; Efron 2004: most of a field is no anomaly), so soil that varies as it does everywhere is not an
-    anomaly, and a field of two soils is not one whose soil varies. At most `share` of the cells, and of the listed patches by their
-    smallest p, are due to chance.
+    anomaly, and a field of two soils is not one whose soil varies. Cells beyond it that touch are a patch, which is then judged as a whole
+    by discs of as many cells elsewhere on the map. At most `share` of the cells, and of the listed patches, are due to chance.
     """
     from scipy.spatial import cKDTree
     from scipy.special import ndtr
@@ -62,7 +71,7 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     tree = cKDTree(place)
     around, nearest, middle = _around(tree, place, cells.value, cells.constants)
     variance = np.maximum(cells.std**2 - cells.constant**2, 1e-12)
-    constants = cells.constants - middle
+    constants = np.nan_to_num(cells.constants - middle)
     beyond, spread = _joined(tree, place, cells.value - around, variance)
     plain, _ = _joined(tree, place, cells.value - nearest, variance)
     shared = [_joined(tree, place, one, variance)[0] for one in constants.T]
@@ -73,18 +82,17 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     scale = float(np.quantile(np.abs(plain / spread)[known], ONE_SD))
     score = beyond / spread / max(scale, 1.0)
     p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
-    patches = [
-        _anomaly(patch, cells, tree, constants, spread * max(scale, 1.0), p)
-        for patch in _patches(tree, place, significant(p, share), score)
-    ]
-    listed = significant(np.array([one.p for one in patches]), share, int(known.sum()))
-    return sorted(compress(patches, listed), key=lambda one: one.p)
+    patches = _patches(tree, place, significant(p, share), score)
+    null = {size: _elsewhere(size, patches, cells, tree, constants) for size in set(map(_size, patches))}
+    found = [_anomaly(patch, cells, tree, constants, null[_size(patch)]) for patch in patches]
+    listed = significant(np.array([one.p for one in found]), share, 1)
+    return sorted(compress(found, listed), key=lambda one: one.p)
 
 
 def significant(p: Floats, share: float, tests: int | None = None) -> Bools:
     """Which p-values (n,) are significant at a false discovery rate of `share` (Benjamini and Hochberg 1995).
 
-    `tests`: of how many these are the smallest, where they are not all.
+    `tests`: of how many these are the smallest, where they are not all; 1 where p is the number that chance makes, not its probability.
     """
     order = np.argsort(p)
     below = np.flatnonzero(p[order] <= share * np.arange(1, len(p) + 1) / max(tests or len(p), 1))
@@ -159,21 +167,57 @@ def _patches(tree: Any, place: Floats, chosen: Bools, score: Floats) -> list[Int
     return [patch for patch in np.split(order, cuts) if len(patch) >= LEAST_CELLS]
 
 
-def _anomaly(patch: Ints, cells: Cells, tree: Any, constants: Floats, spread: Floats, p: Floats) -> Anomaly:
-    """A patch against the cells around it as a whole: those of its cells reach past the rest of a narrow strip, which is no patch."""
-    from scipy.special import ndtr
+def _size(patch: Ints) -> int:
+    """Cells of the discs that a patch is compared with: two sizes for each factor of e."""
+    return math.ceil(math.exp(round(2 * math.log(len(patch))) / 2))
 
+
+def _usual(score: Floats) -> tuple[float, float]:
+    """The usual size of scores, as the SD of a Gaussian and no less than 1, what is stated; and the share of them that are not 0. Without
+    any, all is usual."""
+    if not len(score):
+        return math.inf, 1.0
+    size = np.abs(score[score != 0])
+    usual = float(np.median(size)) / MEDIAN if len(size) else 1.0
+    return max(usual, 1.0), (len(size) + 1) / (len(score) + 1)
+
+
+def _elsewhere(
+    size: int, patches: list[Ints], cells: Cells, tree: Any, constants: Floats
+) -> tuple[float, float]:
+    """`_usual` of the differences, in their SDs, of discs of `size` cells from what is around them, `patches` left out."""
+    place = tree.data
+    patch = np.zeros(len(place), dtype=bool)
+    patch[np.concatenate(patches)] = True
+    middles = np.unique(np.linspace(0, len(place) - 1, PLACES).astype(np.intp))
+    distance, index = (
+        x.reshape(len(middles), -1) for x in tree.query(place[middles], k=min(size, len(place)))
+    )
+    whole = distance[:, -1] < ROUND * math.sqrt(size / math.pi) + 1
+    discs = index[whole & (patch[index].mean(axis=1) <= FREE)]
+    found = (_against(one, cells, tree, constants) for one in discs)
+    return _usual(np.array([(value - base) / std for value, base, std in found]))
+
+
+def _against(patch: Ints, cells: Cells, tree: Any, constants: Floats) -> tuple[float, float, float]:
+    """The mean of a patch by inverse variance, what it should be by the cells around it as a whole, and the SD of the difference. Those
+    around its single cells reach past the rest of a narrow strip, which is no patch."""
     weight = 1 / np.maximum(cells.std[patch] ** 2 - cells.constant[patch] ** 2, 1e-12)
     value, *shared = np.average(
         np.column_stack([cells.value, constants])[patch], axis=0, weights=weight
     ).tolist()
-    base = _beside(patch, cells, tree, value)
     std = float(np.hypot.reduce([1 / np.sqrt(weight.sum()), *shared]))
-    whole = 2 * ndtr(-abs(value - base) / np.median(spread[patch]))
+    return value, _beside(patch, cells, tree, value), std
+
+
+def _anomaly(patch: Ints, cells: Cells, tree: Any, constants: Floats, null: tuple[float, float]) -> Anomaly:
+    from scipy.special import ndtr
+
+    value, base, std = _against(patch, cells, tree, constants)
+    usual, share = null
+    p = 2 * share * ndtr(-abs(value - base) / (std * usual)) * len(cells)
     column, row = tree.data[patch].mean(axis=0) + 0.5
-    return Anomaly(
-        patch, float(column), float(row), value, base, value - base, std, float(max(p[patch].min(), whole))
-    )
+    return Anomaly(patch, float(column), float(row), value, base, value - base, std, float(p))
 
 
 def _beside(patch: Ints, cells: Cells, tree: Any, value: float) -> float:
