@@ -57,6 +57,15 @@ def test_cells_without_adhesion_are_counted_with_the_reason(until: float) -> Non
     assert re.match(r"adhesion: \d+ of \d+ cells; .* slip was too low or too uncertain .* \(--cell\)", note)
 
 
+def test_cells_whose_slip_is_large_by_error_alone_have_no_adhesion() -> None:
+    idle = drive(*lanes(12, 40, 1), slip=0.005)
+    rng, metre = np.random.default_rng(3), idle["distance"].astype(int)
+    for wheel in idle.wheels:
+        idle.columns[f"slip_{wheel}"] = 0.005 + (0.02 * rng.standard_normal(metre[-1] + 1))[metre]
+        idle.columns[f"slip_{wheel}_std"] = np.full(len(idle), 0.02)
+    assert "adhesion" not in map_of([("a", idle)], MapSettings(cell=1.0)).cells
+
+
 def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
     # least squares would, for E[x²] > E[x]²: to about 0.6 of the truth here
     estimates = drive(*lanes(2, 60, 3), slip=0.04)

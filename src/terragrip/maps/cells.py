@@ -28,7 +28,9 @@ LEAST_WAY = 0.05
 LEAST_X = 0.1
 """Where a cell was read at less than this share of the reference (x), its value would be an extrapolation ..."""
 VAGUE_X = 0.35
-"""... and where x is uncertain by more than this share of itself, a guess."""
+"""... and where x is uncertain by more than this share of itself, a guess. So it is where the share is more than this of the x ..."""
+MOST = 0.75
+"""... that this share of the cells stays below, in the same way: alone by its own x, a cell passes by an error that makes it large."""
 
 
 @dataclass(frozen=True)
@@ -177,5 +179,7 @@ def _summed(pieces: Pieces, start: Bools, scatter: float, correlated: float, pas
     cells = Cells(
         pieces.column[begin], pieces.row[begin], value, std, constants.T, rows, passes, pieces.run[begin], pieces.time[begin], headland
     )  # fmt: skip
-    known = (metres > LEAST_WAY) & (x > LEAST_X * metres) & (x_share * np.sqrt(once) < VAGUE_X)
+    usual = (np.quantile(x / metres, MOST) if len(x) else 0.0) * metres
+    vague = x_share * np.sqrt(once) * x > VAGUE_X * np.minimum(x, usual)
+    known = (metres > LEAST_WAY) & (x > LEAST_X * metres) & ~vague
     return cells.where(known)
