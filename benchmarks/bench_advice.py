@@ -28,6 +28,7 @@ from terragrip.advice.analysis import advise
 from terragrip.advice.optimum import GRID, OverSlip, best_of, over_slip
 from terragrip.advice.samples import GatheredSamples
 from terragrip.advice.slip_only import BAND
+from terragrip.advice.soil_curves import driven_share
 from terragrip.estimation import estimate
 from terragrip.simulation import SimulationResult, families
 from terragrip.simulation.families import Kind
@@ -109,7 +110,7 @@ def score(kind: Kind, seed: int, part: str) -> list[Row]:
     for soil, one in advice.items():
         if soil not in samples:
             continue
-        truth = truths(soil, samples[soil].driven)
+        truth = truths(soil, driven_share(vehicle, samples[soil]))
         best, power = best_of(truth, truth.efficiency), best_of(truth, truth.productivity)
 
         def lost(slip: float, truth: OverSlip = truth, top: float = best.efficiency) -> float:
@@ -124,23 +125,25 @@ def score(kind: Kind, seed: int, part: str) -> list[Row]:
     return rows
 
 
-def drawn(kind: Kind, seed: int, part: str) -> tuple[SimulationResult, Callable[[str, float], OverSlip]]:
-    """A machine's drive, and its true curves by the soil's name and the driven wheels' share of the weight."""
+def drawn(
+    kind: Kind, seed: int, part: str
+) -> tuple[SimulationResult, Callable[[str, tuple[float, float]], OverSlip]]:
+    """A machine's drive, and its true curves by the soil's name and the driven wheels' share of the weight, as `driven_share`."""
     if part != "second-plant":
         draw = other_grounds.draw if part in ("other-grounds", "yielding") else families.draw
         result = draw(kind, seed, rate=RATE)
         return result, lambda soil, driven: true_curves(result.scenario, soil, result.vehicle, driven)
     run, scenario, vehicle, seed = second.drive(kind, seed, rate=RATE)
 
-    def truth(soil: str, driven: float) -> OverSlip:
+    def truth(soil: str, driven: tuple[float, float]) -> OverSlip:
         ground = run.ground.soils[-1 if soil == "second" else 0]
         mu, rho, _ = second_curves(vehicle, ground, GRID)
-        return over_slip(mu[None], rho[None], GRID, vehicle.tire_rolling_resistance, driven)
+        return over_slip(mu[None], rho[None], GRID, vehicle.tire_rolling_resistance, *driven)
 
     return result_of(run, scenario, vehicle, seed), truth
 
 
-def true_curves(scenario: Scenario, soil: str, vehicle: Vehicle, driven: float) -> OverSlip:
+def true_curves(scenario: Scenario, soil: str, vehicle: Vehicle, driven: tuple[float, float]) -> OverSlip:
     """The plant's own curve and resistance over slip, wheels sunk in as each slip makes them (families.capacity at every slip)."""
     ground = scenario.soils[soil]
     model = other_grounds.EVERY[ground.curve["name"]]
@@ -151,7 +154,7 @@ def true_curves(scenario: Scenario, soil: str, vehicle: Vehicle, driven: float) 
     rho = ground.resistance + ground.resistance_slip * GRID
     if spots:
         rho = rho + spots[0].front * (1 + spots[0].sinkage * GRID)
-    return over_slip(mu[None], rho[None], GRID, vehicle.tire_rolling_resistance, driven)
+    return over_slip(mu[None], rho[None], GRID, vehicle.tire_rolling_resistance, *driven)
 
 
 def table(rows: list[Row], arguments: argparse.Namespace) -> str:

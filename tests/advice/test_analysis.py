@@ -46,6 +46,37 @@ def test_intervals_of_the_best_slip_hold_the_truth_over_seeds(ground):
     assert np.median(off) <= 0.02
 
 
+@pytest.mark.parametrize("scale", [0.12, 1.26], ids=["10 kg", "12 t"])
+def test_a_pull_shifts_weight_onto_the_driven_axle(scale):
+    """Moments about the rear axle: it carries .6 + .2 kappa of the weight. The load at the best slip needs more than at the drive's own."""
+    mass = 6000 * scale**3
+    axles = {
+        "front": {"mass": 0.4 * mass, "wheels": ["fl", "fr"], "driven": False},
+        "rear": {"mass": 0.6 * mass, "wheels": ["rl", "rr"]},
+    }
+    size = {
+        "wheelbase": 2.5 * scale,
+        "hitch_height": 0.5 * scale,
+        "wheel": {"radius": 0.7 * scale, "inertia": 50 * scale**5},
+    }
+    vehicle = Vehicle.from_dict(VEHICLE.to_dict() | size | {"mass": mass, "axles": axles})
+    estimates = drive(a=1.25, k=7.0, resistance=0.12, top=0.25, vehicle=vehicle)
+
+    def by_moments(mu, rho):
+        kappa = (0.6 * mu - 0.4 * 0.02 - rho) / (1 - 0.2 * (mu + 0.02))
+        return kappa, 0.6 + 0.2 * kappa
+
+    kappa, share = by_moments(estimates["adhesion_rl"], estimates["soil_resistance"])
+    estimates.columns["vertical_load_rear"] = share * mass * 9.80665
+    estimates.columns["vertical_load_front"] = (1 - share) * mass * 9.80665
+    mu = 0.6 * -np.expm1(-7.0 * GRID)
+    kappa, share = by_moments(mu, 0.12)
+    best = int(np.argmax(kappa * (1 - GRID) / (share * (mu + 0.02))))
+    given = only([estimates], vehicle).best_efficiency
+    assert given.net_traction == pytest.approx(kappa[best], rel=0.05)
+    assert given.interval[0] < GRID[best] < given.interval[1]
+
+
 @pytest.mark.parametrize(
     "ground",
     [

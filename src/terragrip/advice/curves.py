@@ -64,7 +64,6 @@ class CurveDraws:
     adhesion: Floats
     resistance: Floats
     stretches: int
-    driven: float
 
     def adhesion_at(self, slip: Floats) -> Floats:
         """mu (draws, slips) over the true slip."""
@@ -172,7 +171,7 @@ def draw_curves(
     scale[0], shift[0] = 1.0, 0.0
     mu, rho = mu * scale, rho + shift
     x = _fit(slip, mu, rho, enough, (slip_sd, mu_sd, rho_sd), prior, prior_sd)
-    return CurveDraws(x, float(np.max(slip[0][enough[0]])), slip[0], mu[0], rho[0], stretches, samples.driven)
+    return CurveDraws(x, float(np.max(slip[0][enough[0]])), slip[0], mu[0], rho[0], stretches)
 
 
 def _pooled(sd: Floats) -> Floats:

@@ -49,15 +49,23 @@ class OverSlip:
 
 
 def over_slip(
-    adhesion: Floats, resistance: Floats, slip: Floats, tire_resistance: float, driven: float = 1.0
+    adhesion: Floats,
+    resistance: Floats,
+    slip: Floats,
+    tire_resistance: float,
+    driven: float = 1.0,
+    transfer: float = 0.0,
 ) -> OverSlip:
-    """Efficiency and net traction of a vehicle whose driven wheels carry the share ``driven`` of its weight.
+    """Efficiency and net traction of a vehicle whose driven wheels carry the share ``driven`` of its weight without a pull, and
+    ``transfer`` more for each pull of its weight.
 
     adhesion, resistance: (draws, slips). With all wheels driven this is paper eq. 5 and 7; else the vehicle pulls
-    driven mu - (1 - driven) rho_t - rho_s, and takes in driven (mu + rho_t). 0 where it pulls nothing.
+    phi mu - (1 - phi) rho_t - rho_s, phi = driven + transfer kappa, and takes in phi (mu + rho_t). 0 where it pulls nothing.
     """
-    net = driven * adhesion - (1 - driven) * tire_resistance - resistance
-    gross = driven * (adhesion + tire_resistance)
+    grip = adhesion + tire_resistance
+    alone = driven * grip - tire_resistance - resistance
+    phi = np.clip(driven + transfer * alone / np.maximum(1 - transfer * grip, 1e-3), 0.0, 1.0)
+    net, gross = phi * grip - tire_resistance - resistance, phi * grip
     efficiency = np.where(net > 0, net / np.where(gross > 0, gross, np.inf) * (1 - slip), 0.0)
     return OverSlip(slip, efficiency, net)
 

@@ -10,6 +10,7 @@ from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
 from terragrip.arrays import Floats
+from terragrip.physics.loads import axle_loads
 from terragrip.soil.estimates import torque_scale_sd, zero_slip_sd
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
@@ -45,9 +46,8 @@ def of_drives(samples: Samples, vehicle: Vehicle) -> SoilCurves | None:
     if draws is None:
         return None
     mu, rho = draws.adhesion_at(GRID), draws.resistance_at(GRID)
-    return SoilCurves(
-        over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, samples.driven), mu, draws.reach
-    )
+    share = driven_share(vehicle, samples)
+    return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, *share), mu, draws.reach)
 
 
 def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int = 0) -> SoilCurves | None:
@@ -71,9 +71,8 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
         level = float(np.average(samples.resistance, weights=samples.metres))
         at = max(float(np.average(samples.slip, weights=samples.metres)), 0.0)
         spread = float(np.nanmedian(samples.resistance_std))
-        driven = samples.driven
     elif soil.resistance is not None:
-        level, at, driven = soil.resistance[0], 0.05, _driven_share(vehicle)
+        level, at = soil.resistance[0], 0.05
         spread = soil.resistance[1] if np.isfinite(soil.resistance[1]) else SHARE_OF_VARIATION * level
     else:
         return None
@@ -81,7 +80,8 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     mu = soil.value(measured) + width * np.interp(measured, GRID, high - low)
     rho = np.maximum(level + spread * shift + growth * (GRID - at), 0.0)
     reach = max((float(one["slip"]) for one in soil.bins), default=float(GRID[-1]))
-    return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, driven), mu, reach)
+    share = driven_share(vehicle, samples)
+    return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, *share), mu, reach)
 
 
 def _band(soil: Soil) -> tuple[Floats, Floats]:
@@ -102,7 +102,21 @@ def _band(soil: Soil) -> tuple[Floats, Floats]:
     return value, value
 
 
-def _driven_share(vehicle: Vehicle) -> float:
-    """The driven axles' share of the weight at rest."""
+def driven_share(vehicle: Vehicle, samples: Samples | None) -> tuple[float, float]:
+    """The driven axles' share of the weight without a pull, and what each pull of the weight adds (physics.md 3); by the rows' loads
+    where there are some, else at rest."""
+    weight = float(vehicle.mass) * STANDARD_GRAVITY
+    load = axle_loads(
+        vehicle.axle_mass,
+        vehicle.axle_to_rear,
+        center_of_gravity_height=vehicle.center_of_gravity_height,
+        hitch_height=vehicle.hitch_height,
+        hitch_overhang=vehicle.hitch_overhang,
+        drawbar=np.array([0.0, weight]),
+    )
     drives = np.array([axle.driven for axle in vehicle.axles.values()])
-    return float(vehicle.axle_mass[drives].sum() / vehicle.axle_mass.sum())
+    share = load[:, drives].sum(axis=1) / load.sum(axis=1)
+    rest, transfer = float(share[0]), float(share[1] - share[0])
+    if samples is None:
+        return rest, transfer
+    return samples.driven - transfer * float(np.average(samples.pull, weights=samples.metres)), transfer
