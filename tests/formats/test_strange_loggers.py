@@ -166,6 +166,11 @@ def test_a_receivers_velocities_in_the_plane_go_together() -> None:
         ("n_Motor_re [1/min]", "wheel_speed_r"),
         ("I_Motor_li [A]", "drive_torque_l"),
         ("p_FL [bar]", None),
+        ("Drehzahl hinten links in 1/min", "wheel_speed_rl"),
+        ("Drehzahl VR, min-1", "wheel_speed_fr"),
+        ("Gierrate / °/s", "angular_velocity_z"),
+        ("wheel speed FL <1/min>", "wheel_speed_fl"),
+        ("Akku in V", None),
     ],
 )
 def test_names_in_other_languages_and_paths(name: str, channel: str | None) -> None:

@@ -53,7 +53,7 @@ MEANINGS: dict[str, str] = {
     "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
     "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel "
     "getriebe rocker bogie boom bucket header cutter cutterbar mast crane ride gestaenge ausleger schneidwerk hubwerk hubwerks hubhoehe "
-    "suspension brems bremse bremsen frein freno",
+    "suspension akku batterie brems bremse bremsen frein freno",
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
@@ -115,6 +115,10 @@ _VOWELS = re.compile(r"(?<!^)[aeiou]")
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
 _OF_MESSAGES = frozenset({"fix", "status", "state", "raw", "exp"})
 """Words that name messages, topics and experiments too, and then say nothing of each field in them."""
+_BEHIND = re.compile(
+    r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*)[>}]?$"
+)
+"""A unit without brackets that is no word: n in 1/min, yaw rate <°/s>."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
 
 
@@ -208,6 +212,9 @@ class Vocabulary:
 
     def read(self, name: str) -> Name:
         """Read a column's name."""
+        behind = _BEHIND.search(name)
+        if behind is not None and is_common(behind["unit"]):
+            name = f"{name[: behind.start()]} [{behind['unit']}]"
         bracket = _BRACKET.search(name)
         body = name[: bracket.start()] if bracket and bracket.start() > 0 else name
         if bracket and body.strip() and not (_is_unit(bracket[1]) and not self._is_word(bracket[1])):
