@@ -136,6 +136,21 @@ def test_signals_of_one_name_are_told_apart(tmp_path: Path) -> None:
             np.testing.assert_allclose(result[name], values, err_msg=name)
 
 
+def test_two_dbcs_that_differ_on_a_message_are_named(tmp_path: Path) -> None:
+    """The first counted, without a word."""
+    files = []
+    for name, scale in (("a", "0.01"), ("b", "0.1")):
+        files.append(tmp_path / f"{name}.dbc")
+        files[-1].write_text(
+            f'VERSION ""\nBS_:\nBU_: E\nBO_ 256 Drive: 8 E\n SG_ Speed : 0|16@1+ ({scale},0) [0|600] "rpm" X\n'
+        )
+    for paths, said in ((files, True), (files[:1] * 2, False)):
+        collected = Frames(catalog(paths))
+        collected.add(0.0, 256, bytes(8))
+        notes = " ".join(signals_of(collected)[1])
+        assert ("unlike ways; the first one given counts: Drive." in notes) == said
+
+
 def test_a_short_frame_lacks_what_it_does_not_reach(dbc: Path) -> None:
     result = decoded([(0.0, 291, bytes(3)), (1.0, 291, bytes(8))], (dbc,))
     assert np.isnan(result["page"][0])

@@ -46,14 +46,18 @@ class Catalog:
     """Messages by identifier and by parameter group; the first of equals counts.
 
     `name` gives each signal its name: its own, or ``Message.Signal`` where several messages have one of that name, or
-    ``Message(1F0).Signal`` by the identifier where these have one name, too. ``given``: names of the messages that came from DBC files.
+    ``Message(1F0).Signal`` by the identifier where these have one name, too. ``differing``: whether by group, and key, of messages of
+    which there are several unlike ones. ``given``: names of the messages that came from DBC files.
     """
 
     def __init__(self, messages: Iterable[Message], given: Iterable[Message] = ()) -> None:
         self.by_identifier: dict[int, Message] = {}
         self.by_group: dict[int, Message] = {}
+        self.differing: set[tuple[bool, int]] = set()
         for message in messages:
-            (self.by_group if message.by_group else self.by_identifier).setdefault(message.key, message)
+            table = self.by_group if message.by_group else self.by_identifier
+            if table.setdefault(message.key, message).fields != message.fields:
+                self.differing.add((message.by_group, message.key))
         names = Counter(message.name for message in self.messages)
         for table in (self.by_identifier, self.by_group):
             for key, message in table.items():

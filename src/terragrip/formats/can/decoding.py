@@ -99,6 +99,11 @@ def _on_frames(frames: Frames) -> list[str]:
     given = frames.catalog.given
     if given and not any(name in given for name, _ in frames.seen):
         notes.append(f"None of the DBC's messages occurs in the log ({', '.join(sorted(given)[:6])}).")
+    unlike = sorted({m.name for m in frames.seen.values() if (m.by_group, m.key) in frames.catalog.differing})
+    if unlike:
+        notes.append(
+            f"Described by two DBCs in unlike ways; the first one given counts: {', '.join(unlike[:6])}."
+        )
     if frames.unknown:
         count, total = len(frames.unknown), sum(frames.unknown.values())
         often = sorted(frames.unknown, key=lambda i: (-frames.unknown[i], i))
