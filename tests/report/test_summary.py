@@ -175,6 +175,29 @@ def test_intervals_by_label_hold_the_truth_and_too_little_has_none() -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_means_are_those_of_the_driven_wheels() -> None:
+    """A tricycle's driven front wheel slipped by 2.2 %; its summary said .3 %, the mean with two free wheels, and drew one of these."""
+    slips = {"f": 0.1, "rl": -0.01, "rr": -0.01}
+    table = pd.DataFrame({"time": np.arange(100.0), "event": "", "distance": np.arange(100.0)})
+    for wheel, slip in slips.items():
+        for quantity, value in (("slip", slip), ("adhesion", 2 * slip)):
+            table[f"{quantity}_{wheel}"], table[f"{quantity}_{wheel}_std"] = value, 0.01
+    rear = {"mass": 150, "wheels": ["rl", "rr"], "driven": False}
+    tricycle = tg.Vehicle.from_dict(
+        {
+            "mass": 250,
+            "wheelbase": 1.2,
+            "center_of_gravity_height": 0.4,
+            "axles": {"front": {"mass": 100, "wheels": ["f"]}, "rear": rear},
+            "wheel": {"radius": 0.2, "inertia": 0.1},
+        }
+    )
+    run = Run("r", table, "bank", vehicle=tricycle)
+    (one,) = shares([blocks_of(run, np.full(100, "soil", dtype=object))])
+    assert (one.slip[0], one.adhesion[0]) == (pytest.approx(0.1), pytest.approx(0.2))
+    assert run.shown_wheel == "f"
+
+
 def test_a_summary_stands_on_top_and_says_what_lacks(tmp_path: Path) -> None:
     for i in range(3):
         made_up.estimates(1000 + i, ("hard",), rows=2400).write(tmp_path / f"hard-{i}.parquet")

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.estimates import driven_of
 from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
@@ -136,9 +137,7 @@ def _names(tally: Tally, quantity: str, columns: Columns) -> list[str]:
     """Columns of a quantity: the vehicle's, else those of the driven wheels."""
     if quantity in ("ground_speed", "soil_resistance"):
         return [quantity] if quantity in columns else []
-    axles = tally.about.get("vehicle", {}).get("axles", {}).values()
-    free = {wheel for axle in axles if axle.get("driven") is False for wheel in axle["wheels"]}
-    return [f"{quantity}_{w}" for w in tally.wheels if w not in free and f"{quantity}_{w}" in columns]
+    return [f"{quantity}_{w}" for w in driven_of(tally.wheels, tally.about) if f"{quantity}_{w}" in columns]
 
 
 def _mean_cell(columns: Columns, names: list[str], chosen: npt.NDArray[np.bool_]) -> str:

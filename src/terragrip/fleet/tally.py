@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation.engine import EVENTS
-from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.estimates import driven_of, wheels_with
 from terragrip.estimation.summary import STANDSTILL
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 PERIOD = 0.2
 """Interval between the rows that soils are learned from [s]; neighbouring rows carry the same information."""
 MEANS = ("ground_speed", "slip", "adhesion", "soil_resistance", "net_traction", "efficiency")
-"""Quantities averaged over a log's time without an event; wheel columns are also averaged over the wheels."""
+"""Quantities averaged over a log's time without an event; wheel columns are also averaged over the driven wheels."""
 POSSIBLE = {
     "ground_speed": (-60.0, 60.0),
     "slip": (-0.25, 1.0),
@@ -138,10 +138,12 @@ def _means(sums: dict[str, Array]) -> dict[str, Any]:
 
 
 def _mean_of(block: Estimates, name: str) -> Array:
-    """A column, or its mean over the wheels that have it; NaN if there is none."""
+    """A column, or its mean over the driven wheels that have it; NaN if there is none."""
     if name in block.columns:
         return block.columns[name]
-    each = [block.columns[f"{name}_{wheel}"] for wheel in wheels_with(name, block.columns)]
+    each = [
+        block.columns[f"{name}_{wheel}"] for wheel in driven_of(wheels_with(name, block.columns), block.about)
+    ]
     return np.mean(each, axis=0) if each else np.full(len(block), np.nan)
 
 

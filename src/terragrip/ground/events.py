@@ -10,7 +10,7 @@ import numpy as np
 from terragrip.arrays import Floats, Ints
 from terragrip.estimation import Estimates
 from terragrip.estimation.engine import EVENTS, SIGNS
-from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.estimates import driven_of, wheels_with
 from terragrip.estimation.settings import WITHOUT_TORQUE, watch_limits
 from terragrip.ground.span import Span
 
@@ -56,8 +56,9 @@ def _spells(estimates: Estimates) -> list[tuple[str, Ints]]:
 
 
 def _mean(estimates: Estimates, quantity: str, rows: Ints) -> Floats:
-    """Mean of a quantity over the wheels (rows,)."""
-    return np.mean([estimates[f"{quantity}_{wheel}"][rows] for wheel in estimates.wheels], axis=0)
+    """Mean of a quantity over the driven wheels (rows,)."""
+    wheels = driven_of(estimates.wheels, estimates.about)
+    return np.mean([estimates[f"{quantity}_{wheel}"][rows] for wheel in wheels], axis=0)
 
 
 def _immobilization(estimates: Estimates, rows: Ints) -> str:

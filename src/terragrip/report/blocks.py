@@ -130,12 +130,14 @@ def share_of(label: str, chosen: Sequence[tuple[Blocks, NDArray[np.bool_]]]) -> 
 
 
 def wheel_mean(run: Run, quantity: str) -> Floats:
-    """The mean of a quantity over the wheels of a run (n,), without stuck rows and those of a large SD of slip; NaN where none is left."""
-    columns = [f"{quantity}_{wheel}" for wheel in run.wheels if f"{quantity}_{wheel}" in run.estimates]
+    """The mean of a quantity over the driven wheels of a run (n,), without stuck rows and those of a large SD of slip; NaN without any."""
+    columns = [f"{quantity}_{wheel}" for wheel in run.driven_wheels if f"{quantity}_{wheel}" in run.estimates]
     if not columns:
         return np.full(len(run.time), np.nan)
     values = np.stack([run.estimated(name) for name in columns])
-    sure = np.stack([run.estimated(f"slip_{wheel}_std") < UNSURE for wheel in run.wheels[: len(columns)]])
+    sure = np.stack(
+        [run.estimated(f"slip_{wheel}_std") < UNSURE for wheel in run.driven_wheels[: len(columns)]]
+    )
     known = np.isfinite(values) & sure & ~run.stuck
     count = known.sum(axis=0)
     return np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
-from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.estimates import driven_of, wheels_with
 from terragrip.report.clock import Clock
 from terragrip.units import STANDARD_GRAVITY
 
@@ -94,6 +94,11 @@ class Run:
         return wheels_with("adhesion", columns) or wheels_with("slip", columns)
 
     @cached_property
+    def driven_wheels(self) -> tuple[str, ...]:
+        """Those of `wheels` that the vehicle drives; all, where it drives none of them or is not known."""
+        return driven_of(self.wheels, {} if self.vehicle is None else {"vehicle": self.vehicle.to_dict()})
+
+    @cached_property
     def has_adhesion(self) -> bool:
         """Whether torques were measured; else there are slip and speeds alone."""
         return bool(wheels_with("adhesion", map(str, self.estimates.columns)))
@@ -111,8 +116,8 @@ class Run:
 
     @property
     def shown_wheel(self) -> str:
-        """The wheel to draw: the one with the sensor, else the last (rear right by custom)."""
-        return self.sensor_wheel or self.wheels[-1]
+        """The wheel to draw: the one with the sensor, else the last driven one (rear right by custom)."""
+        return self.sensor_wheel or self.driven_wheels[-1]
 
     def estimated(self, name: str) -> Floats:
         """An estimated column as (n,) floats."""

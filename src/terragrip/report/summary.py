@@ -94,7 +94,7 @@ def by_label(
         else "By label; transitions (vehicle and tool on different ground) are left out."
     )
     return Table(
-        f"{said} Means over the wheels and over time, stuck spells left out; the interval covers the scatter of half minutes "
+        f"{said} Means over the driven wheels and over time, stuck spells left out; the interval covers the scatter of half minutes "
         "and their shared errors (zero of slip, scale of the torques)."
         + (" Best η and largest µ: by the label's curve, and the slip where they lie." if peaks else ""),
         tuple(head),
