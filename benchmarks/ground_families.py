@@ -6,7 +6,8 @@ One drive a machine over two to four soils that come again and again, estimated 
 resistance or true scale of the curve differ by three times their spread on one soil; others are neither found nor missed. A change counts
 within its transition, give or take 2 s or half the vehicle's length; the second in one is false. Soils: the library is learned from the
 first half of the drive, with its labels, and names the settled blocks of the second; left out: each soil in turn, which then is unknown.
-sure and wrong: share of blocks with a wrong soil of more than 90 %. --write puts the table into docs/ground.md.
+log score: minus the mean log of the probability of the true soil, at least 1e-4 (lower is better). sure and wrong: share of blocks with a
+wrong soil of more than 90 %. --write puts the table into docs/ground.md.
 """
 
 from __future__ import annotations
@@ -41,11 +42,12 @@ SURE = 0.9
 
 @dataclass
 class Named:
-    """Settled blocks of the second half by machine: share right, mean stated probability, share sure and wrong; blocks of soils left
-    out, and those of them called unknown."""
+    """Settled blocks of the second half by machine: share right, mean stated probability, log score, share sure and wrong; blocks of
+    soils left out, and those of them called unknown."""
 
     right: list[float] = field(default_factory=list)
     stated: list[float] = field(default_factory=list)
+    logs: list[float] = field(default_factory=list)
     wrong: list[float] = field(default_factory=list)
     left: int = 0
     unknown: int = 0
@@ -75,16 +77,15 @@ def main() -> None:
         f"{arguments.machines} {arguments.family} machines from seed {arguments.seed}, {arguments.rate:g} Hz; "
         f"soils of {len(ways['afterwards'][1].right)} of them.",
         "",
-        "| way | borders | found (%) | changes right (%) | false an hour | soil right (%) | stated (%) | sure and wrong (%) "
+        "| way | borders | found (%) | changes right (%) | false an hour | soil right (%) | stated (%) | log score | sure and wrong (%) "
         "| left out: unknown (%) |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for way, (one, soils) in ways.items():
-        shares = [100 * float(np.mean(x)) for x in (soils.right, soils.stated, soils.wrong)]
+        right, stated, wrong = (100 * float(np.mean(x)) for x in (soils.right, soils.stated, soils.wrong))
         lines.append(
             f"| {way} | {one.borders} | {100 * one.recall:.0f} | {100 * one.precision:.0f} | {one.false_an_hour:.1f} | "
-            + " | ".join(f"{x:.0f}" for x in (*shares, 100 * soils.unknown / max(soils.left, 1)))
-            + " |"
+            f"{right:.0f} | {stated:.0f} | {np.mean(soils.logs):.2f} | {wrong:.0f} | {100 * soils.unknown / max(soils.left, 1):.0f} |"
         )
     print("\n".join(lines))
     if arguments.write:
@@ -144,9 +145,12 @@ def add_soils(
     late = timeline.known & (timeline.time > half)
     here = late & np.isin(timeline.label, list(library.recognisable))
     if here.any():
-        right, stated = (timeline.soil == timeline.label)[here], timeline.probabilities.max(axis=1)[here]
+        right, probabilities = (timeline.soil == timeline.label)[here], timeline.probabilities[here]
+        stated = probabilities.max(axis=1)
+        true = [timeline.names.index(label) for label in timeline.label[here]]
         named.right.append(float(right.mean()))
         named.stated.append(float(stated.mean()))
+        named.logs.append(-float(np.log(np.maximum(probabilities[np.arange(len(true)), true], 1e-4)).mean()))
         named.wrong.append(float(((stated > SURE) & ~right).mean()))
     every = library.recognisable
     for soil in every if len(every) > 1 else ():

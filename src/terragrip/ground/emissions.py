@@ -25,10 +25,12 @@ from terragrip.ground.laws import (
     normal,
     tempered,
 )
+from terragrip.ground.roughness import Roughness, shared
 from terragrip.ground.unknown import CELLS, ROUGHNESSES, UNKNOWN, cells, textures
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.library import Soil
-from terragrip.soil.signature import Signature, curve_error, signature_in
+from terragrip.soil.pair_density import log_density
+from terragrip.soil.signature import Signature, relative_interval, signature_in
 
 _CURVE_SPREAD = 0.10
 """SD of mu about its curve, relative, where a library does not state it."""
@@ -50,6 +52,11 @@ class Emissions:
     def signatures(self) -> dict[str, Signature | None]:
         """The soils' signatures; raises InputError where one is damaged."""
         return {name: signature_in(soil) for name, soil in self.soils.items()}
+
+    @cached_property
+    def roughness(self) -> Roughness:
+        """Of the soils whose signature can be compared with these estimates."""
+        return shared({name: one for name, one in self.signatures.items() if one and self._comparable(one)})
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -82,7 +89,7 @@ class Emissions:
         A known soil is one state; one whose roughness is not known has a state for each that the unknown soil may have, lest the
         unknown soil win by being sharp where this one must be broad. The unknown soil's cells come last.
         """
-        per = [1 if self._texture(one) else ROUGHNESSES.size for one in self.signatures.values()]
+        per = [1 if name in self.roughness.means else ROUGHNESSES.size for name in self.soils]
         return np.repeat(np.arange(len(per) + 1), [*per, CELLS])
 
     def log_likelihood(self, blocks: Blocks, driven: Floats) -> Floats:
@@ -105,47 +112,28 @@ class Emissions:
         for name, soil in self.soils.items():
             signature = self.signatures[name]
             mine = weight * mixed(_level(soil, signature, blocks), level)
-            texture = self._texture(signature)
-            if texture is None:
+            if name not in self.roughness.means:
                 several = np.repeat(mine[:, None], ROUGHNESSES.size, axis=1)
-                columns.append(several if roughness is None else several + textures(roughness))
+                columns.append(
+                    several if roughness is None else several + textures(roughness, self.roughness.covariance)
+                )
                 continue
             if roughness is not None:
-                own = bivariate(roughness - texture[0], texture[1])
+                own = bivariate(roughness - self.roughness.means[name], self.roughness.covariance)
                 mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
             columns.append(mine[:, None])
-        return np.concatenate([*columns, cells(blocks, roughness, weight)], axis=1)
-
-    def _texture(self, signature: Signature | None) -> tuple[Floats, Floats] | None:
-        """Mean and covariance of a soil's roughness, where they are known and can be compared with these estimates'."""
-        if signature is None or signature.roughness is None or signature.roughness_covariance is None:
-            return None
-        return (signature.roughness, signature.roughness_covariance) if self._comparable(signature) else None
+        return np.concatenate([*columns, cells(blocks, roughness, weight, self.roughness.covariance)], axis=1)
 
     def _comparable(self, signature: Signature) -> bool:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by
 
 
 def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
-    """Log density of rho_s and mu on a known soil, (blocks,)."""
-    error, own, scale = curve_error(soil, blocks)
-    own = own + _relative_interval(soil) ** 2
+    """Log density of rho_s, mu and slip on a known soil, (blocks,)."""
     if signature is None:
         mean, sd = soil.resistance or BROAD_RESISTANCE
-        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale)
-        return mu + normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
-    first = np.sqrt(signature.level_sd[0] ** 2 + blocks.resistance_variance)
-    second = np.sqrt(signature.level_sd[1] ** 2 + own)
-    x, y = (blocks.resistance - signature.level[0]) / first, (error - signature.level[1]) / second
-    correlation = signature.level_correlation
-    covariance = np.array([[1.0, correlation], [correlation, 1.0]])
-    return bivariate(np.stack([x, y], axis=-1), covariance) - np.log(first * second * scale)
-
-
-def _relative_interval(soil: Soil) -> float:
-    """SD of the curve's first free parameter, its height, relative: its 95 % interval over 2 x 1.96; 0 where there is none."""
-    for name, (low, high) in soil.interval.items():
-        value = soil.parameters.get(name)
-        if value:
-            return float(abs(high - low) / (2 * 1.96 * abs(value)))
-    return 0.0
+        shift, spread = 0.0, float(np.hypot(_CURVE_SPREAD, relative_interval(soil) or 0.0))
+    else:
+        (mean, shift), (sd, spread) = signature.level, signature.level_sd
+    resistance = normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
+    return resistance + log_density(soil.value, blocks, spread, shift)
