@@ -32,11 +32,6 @@ def trust(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] = NOTHING)
             f"On {names(apart)} the scale by pull and the paper's by slip differ by over {percent(APART, 0)}: bins of slip gather "
             "weak spots and the noise of slip."
         )
-    words += [
-        f"{one.name}: {one.learned.verdict.sentence}"
-        for one in curves
-        if one.learned.verdict is not None and not one.learned.verdict.follows
-    ]
     return Section("trust", title, (_free_shape(curves[0]), *words), (table, *_ranking(curves)))
 
 

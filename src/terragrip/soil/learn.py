@@ -209,9 +209,6 @@ def learn_soils(
         soils[name] = learned
         words += [f"{name}: {note}" for note in learned.curve.notes_]
         words += (
-            [f"{name}: {learned.verdict.sentence}"] if learned.verdict and not learned.verdict.follows else []
-        )
-        words += (
             [f"{name}: {learned.slip_noise.sentence}"]
             if learned.slip_noise and learned.slip_noise.matters
             else []
@@ -279,6 +276,9 @@ def _learn(
     corrected = _of_noise(parts, curve) if np.isfinite(_joined(parts, "slip_std")).any() else None
     if curve.bins_.settings.by == BY_SLIP and corrected is not None:
         curve.doubt(moved_by_noise(corrected.moved))
+    if verdict is not None and not verdict.follows:
+        curve.doubt(verdict.sentence)
+        curve.notes_ += [verdict.sentence] if verdict.sentence not in curve.notes_ else []
     resistance, speed = _joined(parts, "resistance"), _joined(parts, "speed")
     soil = Soil.from_curve(name, curve, source, (float(np.nanmean(resistance)), float(np.nanstd(resistance))))
     if verdict is not None and not verdict.follows:
