@@ -85,6 +85,8 @@ def run(capsys, files, *options: str) -> tuple[int, str, str]:
         (["--source", "nothing"], "is not a source"),
         (["--source", "udp://127.0.0.1:9", "--sink", "udp://127.0.0.1"], "has no host or no port"),
         (["--source", "udp://127.0.0.1:9", "--quiet"], "would go nowhere"),
+        (["--source", "udp://127.0.0.1.evil.example:9"], "anyone could send samples here"),
+        (["--source", "udp://0.0.0.0:9?allow=10.0.0.0/8"], "is no IP address"),
         (["--source", "udp://127.0.0.1:9", "--held", "speed=1"], "is not a channel and a period"),
         (["--source", "udp://127.0.0.1:9", "--method", "aukf-sf"], "did you mean"),
         (["--source", "udp://127.0.0.1:9", "--library", "no.json"], "no such file"),
@@ -112,7 +114,7 @@ def test_a_missing_package_names_the_extra(capsys, files, monkeypatch):
 def test_events_are_lines_on_standard_error(capsys, files, vehicle, short):
     lines = [json.dumps({"time": t, **values}) for t, values in rows_of(short.recording)]
     assert lines
-    code, out, err = run(capsys, files, "--source", "udp://127.0.0.1:9", "--duration", "1.5")
+    code, out, err = run(capsys, files, "--source", "udp://127.0.0.1:9", "--duration", "3.6")
     assert code == 0
     assert "0 rows estimated" in out
     assert "source_lost: udp://127.0.0.1:9: nothing came for" in err

@@ -105,6 +105,22 @@ def parsed(page: str) -> dict[str, float]:
     return result
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        {"Host": "evil.example"},
+        {"Host": "127.0.0.1.evil.example:8766"},
+        {"Origin": "http://127.evil.example"},
+        {"Origin": "http://[::"},
+    ],
+)
+async def test_a_site_whose_name_leads_here_is_told_nothing(vehicle, port, name):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"studio://127.0.0.1:{port}"])
+    async with running(service):
+        assert (await get(port, "/metrics", **name))[0] == 403
+        assert (await get(port, "/metrics", Host=f"localhost:{port}"))[0] == 200
+
+
 async def test_metrics_are_what_went_in_and_what_came_out(tmp_path, vehicle, short, port, sender):
     """Against what the test itself sent: 200 messages of which 5 are left out, one is doubled, and one is nonsense."""
     service = Service(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from ipaddress import ip_address
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -88,7 +89,12 @@ class Uri:
 
     def is_loopback(self) -> bool:
         """Whether the host can be reached from this machine only."""
-        return self.host in ("localhost", "::1") or self.host.startswith("127.")
+        if self.host == "localhost":
+            return True
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return False  # a name, even 127.0.0.1.example.org, is whatever its owner says
 
 
 Links = dict[str, tuple[str, Collection[str]]]

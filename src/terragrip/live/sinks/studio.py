@@ -85,9 +85,15 @@ class StudioSink:
         return answer
 
     def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
-        """The refusal of a client without the token, where one is set, or of a page of another site; else None."""
+        """The refusal of a client without the token, where one is set, or of a page of another site; else None.
+
+        A site whose name leads to this machine (DNS rebinding) sends no Origin with a GET, but its name as Host.
+        """
         origin = request.headers.get("Origin")
-        if origin and not Uri("", "", host=urlsplit(origin).hostname or "").is_loopback():
+        claimed = [origin] if origin else []
+        if self._credentials.token is None:
+            claimed.append(f"//{request.headers.get('Host', '')}")
+        if not all(map(_is_here, claimed)):
             return http.HTTPStatus.FORBIDDEN, "Pages of other sites are refused.\n"
         if self._credentials.token is None:
             return None
@@ -121,3 +127,11 @@ class StudioSink:
             await connection.close(1008, str(error)[:120])
         except ConnectionClosed:
             return
+
+
+def _is_here(url: str) -> bool:
+    """Whether a URL leads to this machine, by its text alone."""
+    try:
+        return Uri("", "", host=urlsplit(url).hostname or "").is_loopback()
+    except ValueError:
+        return False

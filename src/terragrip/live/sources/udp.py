@@ -6,6 +6,7 @@ import asyncio
 import socket
 import struct
 import sys
+from ipaddress import ip_address
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Feed, Lost
@@ -25,6 +26,14 @@ class UdpSource:
     def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.allowed = frozenset(filter(None, uri.options.get("allow", "").split(",")))
+        for one in self.allowed:
+            try:
+                ip_address(one)
+            except ValueError:
+                hint = "name each sender by its address: ?allow=192.168.1.7,192.168.1.8"
+                raise InputError(
+                    f"allow has {one!r}, which is no IP address", place=uri.text, hint=hint
+                ) from None
         if uri.port is None:
             raise InputError("names no port", place=uri.text, hint="write udp://127.0.0.1:9870")
         if not uri.is_loopback() and not self.allowed:
