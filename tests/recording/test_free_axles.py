@@ -53,6 +53,12 @@ def test_a_free_wheels_radius_that_is_a_quarter_off_is_named() -> None:
     assert "1.25 times as fast as the ground, though nothing drives them" in note
 
 
+def test_the_free_wheels_of_a_machine_that_digs_in_have_no_wrong_scale() -> None:
+    """It hardly moves, so that they go .05 to .34 times as fast as the ground, by the noise of both; driven rims 34 times (simulation)."""
+    dug_in = families.draw(families.Kind("robot", "saturating", "multirate"), 83151, rate=10.0)
+    assert free_axle_warnings(dug_in.recording, dug_in.vehicle) == []
+
+
 def rolling(radius: float, slip: float, *, turning: float = 0.0) -> list[str]:
     """What is said of a free front axle whose ``radius`` the file states as 0.3 m, as that of the driven rear wheels, which slip.
 
