@@ -14,7 +14,7 @@ import pytest
 import terragrip as tg
 from terragrip.cli import main
 from terragrip.errors import InputError
-from terragrip.estimation.c_header import c_header, estimator_of
+from terragrip.estimation.c_header import _number, c_header, estimator_of
 from terragrip.estimation.engine import EVENTS
 
 ROOT = Path(__file__).parents[2]
@@ -130,3 +130,7 @@ def test_numbers_come_back_to_the_last_bit(made: tuple[Path, tg.Estimates, tg.Re
     header = c_header(estimator, "A test */ that does not end the comment.")
     assert f".mass = {estimator.engine.settings().machine.mass!r}" in header
     assert header.count("*/ that") == 0
+    about = tg.Estimates.read_about(folder / "estimates.parquet")
+    vehicle = {**about["vehicle"], "calibration": {"drawbar_offset": -5.25}}
+    assert "-5.25" in c_header(estimator_of({**about, "vehicle": vehicle}, ""), "")
+    assert [_number(sign * np.inf) for sign in (1, -1)] == ["(tg_real)INFINITY", "-(tg_real)INFINITY"]

@@ -74,8 +74,18 @@ def test_no_positions(tmp_path: Path, how: str, capsys: pytest.CaptureFixture[st
         (lambda lat, lon: (lat * 111e3, lon * 70e3), "metres"),
         (lambda lat, lon: (coded(lat), coded(lon)), "-9999 looks like a code"),
         (lambda lat, lon: (lat, coded(lon)), "-9999 looks like a code"),
+        (lambda lat, lon: (lon + 100, lat), "they look swapped"),
     ],
-    ids=["swapped", "east for west", "south for north", "radians", "metres", "code", "code of one"],
+    ids=[
+        "swapped",
+        "east for west",
+        "south for north",
+        "radians",
+        "metres",
+        "code",
+        "code of one",
+        "swapped in the east",
+    ],
 )
 def test_positions_that_contradict_speed_or_heading(
     tmp_path: Path, change: Change, fix: str, capsys: pytest.CaptureFixture[str]

@@ -12,13 +12,17 @@ import pytest
 
 pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
+from pyproj import Transformer
+
 from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.maps import MapMaker, MapSettings, map_of, write_map
 from terragrip.maps.layers import cell_table, layer
 from terragrip.maps.places import places_of
+from terragrip.maps.values import _adhesion_constants, _resistance_constants, driven_slip
 from terragrip.physics.adhesion import CURVES
+from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     import geopandas
@@ -64,6 +68,27 @@ def test_cells_whose_slip_is_large_by_error_alone_have_no_adhesion() -> None:
         idle.columns[f"slip_{wheel}"] = 0.005 + (0.02 * rng.standard_normal(metre[-1] + 1))[metre]
         idle.columns[f"slip_{wheel}_std"] = np.full(len(idle), 0.02)
     assert "adhesion" not in map_of([("a", idle)], MapSettings(cell=1.0)).cells
+
+
+def test_the_slip_driven_is_that_of_the_middle_of_the_way() -> None:
+    one = drive(*lanes(2, 30, 3))
+    share = one["distance"] / one["distance"][-1]
+    for wheel in one.wheels:
+        one.columns[f"slip_{wheel}"] = np.select([share < 0.2, share < 0.7], [0.02, 0.05], 0.15)
+    assert driven_slip(one) == 0.05
+
+
+def test_a_torques_zero_weighs_by_the_load_that_it_turns() -> None:
+    """In closed form: the zero over radius and load; of the resistance that of all wheels, by chance, over the weight."""
+    one = drive(*lanes(1, 30, 1))
+    one.about["vehicle"]["uncertainty"] = {"drive_torque_offset": 0.3}
+    vehicle, mu = one.vehicle, one["adhesion_rl"]
+    rear = vehicle.wheels.index("rl")
+    load = vehicle.axle_mass[vehicle.wheel_axle[rear]] / 2 * STANDARD_GRAVITY
+    offset = 0.3 / vehicle.wheel_radius[rear]
+    np.testing.assert_allclose(_adhesion_constants(vehicle, mu, rear)[:, 1], offset / load)
+    zeros = _resistance_constants(vehicle, one)[0][:, 1]
+    np.testing.assert_allclose(zeros, 2 * offset / (vehicle.mass * STANDARD_GRAVITY))
 
 
 def test_errors_of_slip_do_not_draw_a_cell_down() -> None:
@@ -204,6 +229,11 @@ def test_noise_in_a_field_of_one_soil_is_no_anomaly_beside_a_real_one() -> None:
     for seed in range(1, 4):
         made = map_of([("a", drive(*lanes(20, 40, 1), a=ground, noise=0.01, seed=seed))])
         assert [len(found) for found in made.anomalies.values()] == [1, 0]
+        (one,) = made.anomalies["adhesion"]
+        to_degrees = Transformer.from_crs(made.epsg, 4326)
+        place = np.array(to_degrees.transform(one.column * made.cell, one.row * made.cell)) - (51.0, 13.5)
+        metres = np.radians(place) * EARTH * (1.0, np.cos(np.radians(51.0)))
+        np.testing.assert_allclose(metres, (10, 20), atol=0.6)
 
 
 def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
