@@ -8,6 +8,7 @@ import gc
 import itertools
 import json
 import os
+import socket
 import struct
 import threading
 
@@ -324,6 +325,21 @@ async def test_a_receiver_on_a_serial_line(vehicle, port):
     rows = [message.row for message in service.seen if message.kind == "estimate"]
     assert rows[0].values["ground_speed"] == pytest.approx(2.0 * 1852 / 3600)
     assert rows[0].values["latitude"] == pytest.approx(48 + 7.038 / 60)
+
+
+async def test_a_receiver_that_serves_by_tcp_is_lost_and_comes_back(vehicle):
+    line = sentence("GPRMC,123500,A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.setblocking(False)
+        loop = asyncio.get_running_loop()
+        service = Service(vehicle, [f"serial:socket://127.0.0.1:{server.getsockname()[1]}"])
+        async with running(service):
+            for count in (1, 2):
+                with (await loop.sock_accept(server))[0] as link:
+                    link.sendall(line)
+                    await until(lambda count=count: service.feeds[0].messages == count)
+                await until(lambda count=count: len(events(service, "source_lost")) == count)
+    assert len(events(service, "source_back")) == 1
 
 
 async def test_a_receiver_without_a_fix_and_one_at_another_baud_rate_are_named(vehicle):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from terragrip.errors import InputError
 from terragrip.formats.nmea_sentences import sentences
@@ -16,7 +15,7 @@ _FRAME = re.compile(r"[$!][A-Z][A-Z0-9]+,[^$!*]*\*[0-9A-Fa-f]{2}")  # a sentence
 
 
 class SerialSource:
-    """``serial:/dev/ttyUSB0?baud=4800``."""
+    """``serial:/dev/ttyUSB0?baud=4800``; ``serial:socket://192.168.1.20:10110`` where receiver or router serve sentences by TCP."""
 
     real_time = True
 
@@ -29,6 +28,11 @@ class SerialSource:
         self.baud = round(uri.number("baud", 4800))
         if not uri.path:
             raise InputError("names no device", place=uri.text, hint="write serial:/dev/ttyUSB0")
+        scheme, mark = uri.path.partition("://")[:2]
+        if mark and scheme != "socket":
+            raise InputError(
+                f"{scheme}:// is no line", place=uri.text, hint="write serial:socket://HOST:PORT"
+            )
 
     async def run(self, feed: Feed) -> None:
         """Feed sentences; raises Lost where the device is not there or goes away."""
@@ -36,7 +40,7 @@ class SerialSource:
 
         bridge, rest = ThreadBridge(feed), b""
         try:
-            line = serial.Serial(str(Path(self.uri.path)), self.baud, timeout=0.2)
+            line = serial.serial_for_url(self.uri.path, self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
             raise Lost(f"the device: {error}") from error
         feed.one_layout = False
