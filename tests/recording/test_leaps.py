@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.leaps import leap_warnings
+from terragrip.simulation import families
 from terragrip.vehicle import Vehicle
 
 G, RADIUS, WHEELS = 9.80665, 0.2, ("fl", "fr", "rl", "rr")
@@ -116,3 +118,9 @@ def test_a_wheel_on_rough_ground_whose_soil_changes_is_no_moved_zero(vehicle: Ve
     shifts[:, near] = 6 * np.outer([-1, 1, 0, 0], np.sign(TIME[near] - 59.97))  # from wheel to wheel
     right = columns | {name: columns[name] - falls + own for name, own in zip(TORQUES, shifts, strict=True)}
     assert notes(right, vehicle) == []
+
+
+def test_a_torque_that_leaps_where_the_axles_other_one_follows_is_the_grounds() -> None:
+    """Both double in seconds, one of them by a leap (a right simulated drive)."""
+    drawn = families.draw(families.Kind("light", "brixius", "uncoupled"), 91014, rate=20.0)
+    assert leap_warnings(drawn.recording, drawn.vehicle) == []

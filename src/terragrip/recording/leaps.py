@@ -76,7 +76,8 @@ def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if "drawbar_force" in channels:
         parts["drawbar_force"] = -channels["drawbar_force"] / vehicle.mass
     climb = STANDARD_GRAVITY * np.sin(channels["pitch"]) if "pitch" in channels else np.zeros(len(recording))
-    return _unanswered(recording, drive, parts, climb)
+    axles = [[f"drive_torque_{w}" for w in axle.wheels if w in radii] for axle in vehicle.axles.values()]
+    return _unanswered(recording, drive, parts, climb, axles)
 
 
 def _drive_of(recording: Recording) -> _Drive | None:
@@ -99,8 +100,10 @@ def _drive_of(recording: Recording) -> _Drive | None:
     return _Drive(time, middle, inside, speed) if inside.any() else None
 
 
-def _unanswered(recording: Recording, drive: _Drive, parts: dict[str, Floats], climb: Floats) -> list[str]:
-    """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with."""
+def _unanswered(
+    recording: Recording, drive: _Drive, parts: dict[str, Floats], climb: Floats, axles: list[list[str]]
+) -> list[str]:
+    """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with; ``axles``: the torques of each."""
     if any(np.isfinite(part).sum() < 2 for part in (*parts.values(), climb)):
         return []
     thrust = np.sum([filled(drive.time, part) for part in parts.values()], axis=0)
@@ -110,6 +113,12 @@ def _unanswered(recording: Recording, drive: _Drive, parts: dict[str, Floats], c
         max(_LEAST * STANDARD_GRAVITY, _BEYOND * spread), max(PULL * STANDARD_GRAVITY, 2 * _BEYOND * spread)
     )
     leaps = {name: _leaps(drive, part) for name, part in parts.items()}
+    for name, others in ((name, [o for o in axle if o != name]) for axle in axles for name in axle):
+        alone = (leaps[name] != 0) & ~np.any([leaps[other] for other in others], axis=0)
+        if others and alone.any():  # one that the axle's other wheel follows is the ground's
+            beside = np.mean([filled(drive.time, parts[other]) for other in others], axis=0)
+            apart = drive.shift(filled(drive.time, parts[name]) - beside)
+            leaps[name][alone & (np.abs(apart - leaps[name]) > _HALF * np.abs(leaps[name]))] = 0.0
     leap = np.sum(list(leaps.values()), axis=0)
     rows = drive.inside & (np.abs(leap) > least) & (np.abs(left - leap) < _REST * np.abs(leap))
     found: dict[tuple[str, ...], list[int]] = {}
