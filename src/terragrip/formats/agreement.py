@@ -286,7 +286,7 @@ class Agreement:
         ):
             return None
         speed = self._evidence.at(ground[0], series[0])
-        if speed is None or not np.isfinite(speed).any():
+        if not np.isfinite(speed).any():
             return None
         sideways = float(np.nanquantile(np.abs(series[1] * speed * ground[1]), 0.9))
         if sideways < _SIDEWAYS:
@@ -323,9 +323,8 @@ class Agreement:
         ground = self._ground(ranked)
         if lateral is not None and lateral.unit is not None and ground is not None:
             series = self._evidence.series(lateral.column.column)
-            speed = None if series is None else self._evidence.at(ground[0], series[0])
-            if series is not None and speed is not None:
-                speed = speed * ground[1]
+            if series is not None:
+                speed = ground[1] * self._evidence.at(ground[0], series[0])
                 with np.errstate(divide="ignore", invalid="ignore"):
                     sideways = np.where(
                         np.abs(speed) > 1.0, series[1] * factor_to(lateral.unit, "m/s^2") / speed, np.nan

@@ -99,11 +99,11 @@ class Evidence:
         fresh = np.concatenate(([True], np.diff(result[1]) != 0))
         return (result[0][fresh], result[1][fresh]) if fresh.sum() >= fewest else None
 
-    def at(self, name: str, instants: Floats) -> Floats | None:
-        """Values of a column at ``instants`` (m,), on straight lines between its samples; NaN outside and in gaps."""
+    def at(self, name: str, instants: Floats) -> Floats:
+        """Values of a column at ``instants`` (m,), on straight lines between its samples; NaN outside, in gaps, and without a series."""
         out = self.series(name)
         if out is None:
-            return None
+            return np.full(len(instants), np.nan)
         time, values = out
         result = np.interp(instants, time, values, left=np.nan, right=np.nan)
         gap = _gap(time)
@@ -133,8 +133,6 @@ class Evidence:
             return None
         time = first[0]
         other = self.at(pair[1], time)
-        if other is None:
-            return None
         known = np.isfinite(other)
         time, a, b = time[known], first[1][known], other[known]
         moved = np.concatenate(
@@ -209,8 +207,6 @@ class Evidence:
         if result is None:
             return None
         other = self.at(upper, result[0])
-        if other is None:
-            return None
         known = np.isfinite(other)
         signed = (other * result[1])[known]
         a, b = np.abs(other[known]), np.abs(result[1][known])
@@ -226,8 +222,7 @@ class Evidence:
 
     def fit(self, name: str, time: Floats, reference: Floats) -> tuple[float, float] | None:
         """Slope of a column over a ``reference`` (m,) at ``time`` (m,), and their correlation."""
-        values = self.at(name, time)
-        return None if values is None else slope_of(reference, values)
+        return slope_of(reference, self.at(name, time))
 
     def rate_of_angle(self, name: str, *, degrees: bool) -> Series | None:
         """The rate [rad/s] of an angle column that wraps."""

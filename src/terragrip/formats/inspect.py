@@ -252,16 +252,11 @@ class Seen:
         own = self.stamp is not None and name == self.stamp[0]
         return self.clocks.get(name, None if own else self.base)
 
-    def floats(self) -> dict[str, Floats]:
-        """The numeric columns."""
-        return {
-            n: c.astype(np.float64, copy=False) for n, c in self.columns.items() if c.dtype.kind in "fiub"
-        }
-
     def numbers(self) -> dict[str, Floats]:
         """The numeric columns but time."""
         own = None if self.stamp is None or self.clocks else self.stamp[0]
-        return {n: values for n, values in self.floats().items() if n != own}
+        kept = {n: c for n, c in self.columns.items() if c.dtype.kind in "fiub" and n != own}
+        return {n: c.astype(np.float64, copy=False) for n, c in kept.items()}
 
     def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> Proposals:
         """What each channel may be made of, by a vocabulary, and by the radii of a vehicle."""

@@ -212,10 +212,7 @@ def _together(evidence: Evidence, columns: list[str]) -> Floats | None:
     if series is None:
         return None
     time = series[0]
-    found = [values for column in columns if (values := evidence.at(column, time)) is not None]
-    if len(found) < len(columns):
-        return None
-    rows = np.array(found)
+    rows = np.array([evidence.at(column, time) for column in columns])
     known = np.isfinite(rows).all(axis=0)
     if known.sum() < _FEWEST:
         return None

@@ -188,11 +188,10 @@ class Rims:
             return
         kind = kind_of(first.unit) or ""
         series = self._evidence.series(second.column.column)
-        other = None if series is None else self._evidence.at(first.column.column, series[0])
-        if series is None or other is None or kind not in _TRACKS or first.column.name.has("motor"):
+        if series is None or kind not in _TRACKS or first.column.name.has("motor"):
             return
         factor = factor_to(first.unit, "rad/s" if kind == "rotation" else "m/s")
-        difference = factor * (series[1] - other)
+        difference = factor * (series[1] - self._evidence.at(first.column.column, series[0]))
         for source, (time, rate) in turns:
             known = np.isfinite(rate)
             if not known.any() or float(np.quantile(np.abs(rate[known]), 0.95)) < _TURNING:
