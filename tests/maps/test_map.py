@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +13,13 @@ import pytest
 
 pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
-from pyproj import Transformer
 
 from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.maps import MapMaker, MapSettings, map_of, write_map
 from terragrip.maps.layers import cell_table, layer
-from terragrip.maps.places import places_of
+from terragrip.maps.places import places_of, zone_of
 from terragrip.maps.values import _adhesion_constants, _resistance_constants, driven_slip
 from terragrip.physics.adhesion import CURVES
 from terragrip.units import STANDARD_GRAVITY
@@ -174,20 +174,6 @@ def test_intervals_stay_where_no_pass_is_repeated_or_passes_differ_more_than_the
     assert changed.changes["adhesion"].significant.mean() > 0.9
 
 
-def test_patches_are_listed_and_borders_are_not() -> None:
-    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
-        hole = (np.abs(east - 12) < 2) & (np.abs(north - 10) < 2)
-        firm = (np.abs(east - 40) < 2) & (np.abs(north - 20) < 2)
-        return np.where(east < 26, 0.8, 1.1) * np.where(hole, 0.5, 1.0) * np.where(firm, 1.5, 1.0)
-
-    made = map_of([("a", drive(*lanes(30, 52, 1), a=ground, noise=0.01))], MapSettings(cell=1.0))
-    found = layer(made, "anomalies")
-    found = found[found.quantity == "adhesion"]
-    assert sorted(found.kind) == ["grips", "slips"]
-    assert np.all(found.p < 0.05)
-    assert np.all(found.area.between(9, 60))
-
-
 @pytest.mark.parametrize(
     ("mass", "lanes_apart", "width", "cell"),
     [
@@ -220,75 +206,6 @@ def test_cells_are_no_smaller_than_the_positions_are_good(rounded: float, noise:
         moved = one[name] * degree + noise * rng.standard_normal(len(one))
         one.columns[name] = (np.round(moved / rounded) * rounded if rounded else moved) / degree
     assert map_of([("a", one)]).cell == cell
-
-
-def test_noise_in_a_field_of_one_soil_is_no_anomaly_beside_a_real_one() -> None:
-    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
-        return np.where((np.abs(east - 20) < 2) & (np.abs(north - 10) < 2), 0.5, 1.0)
-
-    for seed in range(1, 4):
-        made = map_of([("a", drive(*lanes(20, 40, 1), a=ground, noise=0.01, seed=seed))])
-        assert [len(found) for found in made.anomalies.values()] == [1, 0]
-        (one,) = made.anomalies["adhesion"]
-        to_degrees = Transformer.from_crs(made.epsg, 4326)
-        place = np.array(to_degrees.transform(one.column * made.cell, one.row * made.cell)) - (51.0, 13.5)
-        metres = np.radians(place) * EARTH * (1.0, np.cos(np.radians(51.0)))
-        np.testing.assert_allclose(metres, (10, 20), atol=0.6)
-
-
-def test_a_patch_is_found_in_a_field_of_two_soils_that_vary() -> None:
-    rng = np.random.default_rng(5)
-    waves = rng.normal(0, 0.5, (40, 2)), rng.uniform(0, 6.3, 40)
-
-    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
-        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
-        firm = (np.abs(east - 30) < 2) & (np.abs(north - 9) < 2)
-        return np.where(north > 14, 1.3, 1.0) * (1 + 0.01 * own) + 0.35 * firm
-
-    made = map_of([("a", drive(*lanes(20, 60, 1), a=ground, noise=0.01))])
-    found = layer(made, "anomalies")
-    assert np.any(
-        np.abs(local_east(found[(found.quantity == "adhesion") & (found.kind == "grips")]) - 30) < 1
-    )
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_soil_whose_strength_comes_and_goes_everywhere_has_no_anomalies(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    waves = rng.normal(0, 1 / 8, (60, 2)), rng.uniform(0, 6.3, 60)
-
-    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
-        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
-        return np.exp(0.022 * own)
-
-    made = map_of([("a", drive(*lanes(20, 50, 1), a=ground, noise=0.01, seed=seed))])
-    assert not made.anomalies["adhesion"]
-
-
-@pytest.mark.parametrize("seed", [1, 3])
-def test_a_strip_of_another_soil_along_the_edge_is_no_patch(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    waves = rng.normal(0, 0.5, (40, 2)), rng.uniform(0, 6.3, 40)
-
-    def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
-        own = np.cos(np.outer(east, waves[0][:, 0]) + np.outer(north, waves[0][:, 1]) + waves[1]).sum(axis=1)
-        return np.where(north > 16.5, 1.2, 1.0) * (1 + 0.015 * own)
-
-    made = map_of([("a", drive(*lanes(20, 60, 1), a=ground, noise=0.01, seed=seed))])
-    assert not any(one.difference > 0 for one in made.anomalies["adhesion"])
-
-
-def test_ground_driven_at_another_slip_is_no_anomaly_where_its_curve_may_bend_otherwise() -> None:
-    """One soil of another form than the paper's: carried to the reference from below it is too high, from above it too low."""
-    east, north = lanes(20, 40, 1)
-    one, curve = drive(east, north), CURVES["burckhardt"]
-    slip = np.where((np.abs(east - 20) < 4) & (np.abs(north - 10) < 3), 0.15, 0.07)
-    for wheel in one.wheels:
-        one.columns[f"slip_{wheel}"] = slip
-        one.columns[f"adhesion_{wheel}"] = np.asarray(curve.value(slip, {}))
-    made = map_of([("a", one)], MapSettings(reference_slip=0.1))
-    assert np.ptp(made.cells["adhesion"].value) > 0.1
-    assert not made.anomalies["adhesion"]
 
 
 def test_change_between_days_is_significant_where_it_is_one() -> None:
@@ -343,6 +260,21 @@ def test_a_single_pass_has_no_changes_and_says_so() -> None:
     made = map_of([("a", drive(*lanes(1, 40, 2)))])
     assert not made.changes
     assert any("driven once" in note for note in made.notes)
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "epsg"),
+    [
+        (-16.8, (179.999, -179.999), {32701, 32760}),
+        (60.4, (5.3, 5.31), {32632}),
+        (51.2, (11.999, 12.002), {32633}),
+    ],
+    ids=["both sides of 180 degrees", "Norway", "two zones"],
+)
+def test_the_grid_is_the_zone_of_the_middle(
+    latitude: float, longitude: tuple[float, float], epsg: set[int]
+) -> None:
+    assert zone_of(np.full(2, latitude), np.array(longitude)) in epsg
 
 
 def test_headlands_are_apart_from_the_field() -> None:
@@ -404,12 +336,16 @@ def test_files_are_read_back_by_others(tmp_path: Path, suffix: str) -> None:
     if suffix == ".tif":
         with rasterio.open(path) as file:
             assert file.crs.to_epsg() == made.epsg == 32633
-            bands = dict(zip(file.descriptions, file.read(), strict=True))
+            about, bands = (
+                file.tags()["TERRAGRIP_MAP"],
+                dict(zip(file.descriptions, file.read(), strict=True)),
+            )
             row = round(file.bounds.top / made.cell) - 1 - cells.row[0]
             column = cells.column[0] - round(file.bounds.left / made.cell)
         assert bands["adhesion"][row, column] == pytest.approx(cells.value[0], rel=1e-6)
         assert bands["adhesion_std"][row, column] == pytest.approx(cells.std[0], rel=1e-6)
         assert np.isfinite(bands["adhesion"]).sum() == len(cells)
+        assert json.loads(about)["reference_slip"] == made.reference_slip
     elif suffix == ".png":
         assert path.read_bytes()[:4] == b"\x89PNG"
     else:

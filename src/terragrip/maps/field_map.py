@@ -15,7 +15,7 @@ from terragrip.maps.cells import CORRELATED, Cells, Pieces, cells_of, pieces_of
 from terragrip.maps.changes import Changes, changes_of
 from terragrip.maps.filling import filled
 from terragrip.maps.lanes import lane_spacing
-from terragrip.maps.places import Places, has_positions, places_of, zone_of
+from terragrip.maps.places import Places, has_positions, middle_of, places_of, zone_of
 from terragrip.maps.points import Points, points_of
 from terragrip.maps.repeats import WORTH_A_WORD, scaled, share_of_repeats
 from terragrip.maps.soils import SoilWay, soil_of_cells, soil_way
@@ -130,10 +130,7 @@ class MapMaker:
         self._epsg, self._cell, self._correlated = epsg, cell, CORRELATED * radius
         self._slip = self.settings.reference_slip or usual_slip(estimates)
         self._origin = float(np.nanmedian(places.east)), float(np.nanmedian(places.north))
-        self._middle = (
-            float(np.nanmedian(estimates["latitude"])),
-            float(np.nanmedian(estimates["longitude"])),
-        )
+        self._middle = middle_of(estimates["latitude"], estimates["longitude"])
 
     def _check_extent(self, places: Places, cell: float, file: str) -> None:
         known = np.isfinite(places.east)

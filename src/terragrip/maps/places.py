@@ -56,13 +56,23 @@ class Places:
         return self.east + forward * cosine - left * sine, self.north + forward * sine + left * cosine
 
 
-def zone_of(latitude: Floats, longitude: Floats) -> int:
-    """EPSG code of the UTM zone (of a polar grid beyond 84° N and 80° S) around the median of positions [deg] (n,)."""
+def middle_of(latitude: Floats, longitude: Floats) -> tuple[float, float]:
+    """The median latitude and longitude [deg] of positions (n,), also where they lie on both sides of 180°."""
     known = np.isfinite(latitude) & np.isfinite(longitude)
-    north, east = float(np.median(latitude[known])), float(np.median(longitude[known]))
+    first = float(longitude[known][0])
+    around = np.remainder(longitude[known] - first + 180.0, 360.0) - 180.0
+    east = np.remainder(first + float(np.median(around)) + 180.0, 360.0) - 180.0
+    return float(np.median(latitude[known])), float(east)
+
+
+def zone_of(latitude: Floats, longitude: Floats) -> int:
+    """EPSG code of the UTM zone (of a polar grid beyond 84° N and 80° S) around the median of positions [deg] (n,). Norway's south-west
+    is of zone 32."""
+    north, east = middle_of(latitude, longitude)
     if not -80.0 <= north <= 84.0:
         return 32661 if north > 0 else 32761
-    zone = int((east + 180.0) // 6.0) % 60 + 1
+    norway = 56.0 <= north < 64.0 and 3.0 <= east < 6.0
+    zone = 32 if norway else int((east + 180.0) // 6.0) % 60 + 1
     return (32600 if north >= 0 else 32700) + zone
 
 

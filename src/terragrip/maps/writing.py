@@ -72,15 +72,22 @@ def write_map(made: FieldMap, path: str | os.PathLike[str], layer: str = "cells"
             )
 
 
-def _geopackage(made: FieldMap, path: Path) -> None:
-    from terragrip.maps.layers import LAYERS, changes_between
-    from terragrip.maps.layers import layer as table
+def _metadata(made: FieldMap) -> dict[str, str]:
+    """How the map was made, as a file's metadata."""
+    from terragrip.maps.layers import changes_between
 
-    path.unlink()
     about = About(
         made.epsg, made.cell, made.datum, made.reference_slip, list(made.runs), list(made.notes), changes_between(made)
     )  # fmt: skip
-    metadata = {ABOUT: about.to_text()}
+    return {ABOUT: about.to_text()}
+
+
+def _geopackage(made: FieldMap, path: Path) -> None:
+    from terragrip.maps.layers import LAYERS
+    from terragrip.maps.layers import layer as table
+
+    path.unlink()
+    metadata = _metadata(made)
     for name in LAYERS:
         frame = table(made, name)
         if name == "changes" and not len(frame):
@@ -116,6 +123,7 @@ def _geotiff(made: FieldMap, path: Path) -> None:
     }  # fmt: skip
     with rasterio.MemoryFile() as memory:
         with memory.open(**profile) as file:
+            file.update_tags(**_metadata(made))
             for band, name in enumerate(names, 1):
                 values = np.full((height, width), np.nan, dtype=np.float32)
                 values[top - row, column - west] = table[name]
