@@ -36,9 +36,9 @@ def picture(made: FieldMap) -> Figure:
         title = QUANTITIES[quantity]
         if quantity == "adhesion":
             title = title.replace("the reference slip", f"{100 * made.reference_slip:g} % slip")
-        scale, deviation = 1.0, "its standard deviation"
+        scale, deviation = 1.0, "its standard deviation [-]"
         if quantity in SHARES:
-            scale, title, deviation = 100.0, title.replace("[-]", "[%]"), f"{deviation} [%]"
+            scale, title, deviation = 100.0, title.replace("[-]", "[%]"), deviation.replace("[-]", "[%]")
         _panel(line[0], made, cells.column, cells.row, scale * cells.value, corner, "viridis", title)
         _panel(line[1], made, cells.column, cells.row, scale * cells.std, corner, "cividis", deviation)
         for one in made.anomalies.get(quantity, []):
