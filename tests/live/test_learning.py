@@ -194,3 +194,18 @@ def test_torques_that_are_0_while_the_machine_pulls_are_an_event(vehicle, long):
     assert event.text.startswith(f"{torques[0]} (0) and ")
     assert "never change while the vehicle drives" in event.text
     assert event.time < 50
+
+
+def test_a_contradiction_that_goes_and_comes_is_said_once(vehicle, monkeypatch):
+    monkeypatch.setattr(learning, "ROWS", 50)
+    found = iter([True, True, False, True, True, True, False, False, True, True, False, True, True, True])
+    monkeypatch.setattr(
+        "terragrip.recording.plausibility.warnings_by_check",
+        lambda *_: {"masses": ["check the masses"]} if next(found) else {},
+    )
+    learner = SettingsLearner(vehicle, ("ground_speed",), {}, {})
+    noise = np.random.default_rng(0).standard_normal(5000)
+    learned = [learner.add(0.01 * k, {"ground_speed": 1 + 0.1 * float(one)}) for k, one in enumerate(noise)]
+    assert [dict(one.doubts) for one in learned if one is not None and one.doubts] == [
+        {"masses": ["check the masses"]}
+    ]

@@ -79,7 +79,9 @@ class SettingsLearner:
         self._missing = (math.nan,) * len(channels)
         self._number = 0  # of the chunk that is open
         self._every = 1
-        self._doubtful: dict[str, int] = {}  # evaluations in a row that found something, by check
+        self._doubtful: dict[
+            str, int
+        ] = {}  # evaluations in a row that found something, by check; kept once they were two, and said
         self._open = array("d")  # rows one behind the other: time, then the channels
         self._began = math.nan
         self._rows = 0
@@ -139,7 +141,8 @@ class SettingsLearner:
         noise, _ = settings_in(log, self._vehicle, sensors=self._noise, held=held)
         seconds = sum(rows[-1 - len(self._channels)] - rows[0] for rows in self._kept.values())
         found = warnings_by_check(log, self._vehicle)
-        self._doubtful = {name: self._doubtful.get(name, 0) + 1 for name in found}
+        said = {name: count for name, count in self._doubtful.items() if count >= 2}
+        self._doubtful = said | {name: self._doubtful.get(name, 0) + 1 for name in found}
         doubts = {name: notes for name, notes in found.items() if self._doubtful[name] == 2}
         absent = tuple(name for name in self._channels if name not in known and self._number == 1)
         return Learned(noise, held, seconds, doubts, absent)
