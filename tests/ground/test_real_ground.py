@@ -36,11 +36,6 @@ def test_a_warthog_on_grass_is_not_a_made_up_soil(shared: Callable[[str], Path],
     result = estimated(shared("data/drive_warthog/raw20hz/warthog_wheels_grass.csv.gz"), "drive_warthog")
     ground, table = analyse(result, library)
     np.testing.assert_allclose(ground.timeline.probabilities.sum(axis=1), 1)
-    timeline = ground.timeline
-    soil, sure = timeline.soil[timeline.known], timeline.probabilities.max(axis=1)[timeline.known] > 0.9
-    assert (
-        soil == "unknown"
-    ).mean() > 0.8  # 88 %: the rest has the drawn grass's resistance, and says it is not sure
-    assert set(soil[sure]) == {"unknown"}
+    assert (ground.timeline.soil[ground.timeline.known] == "unknown").mean() > 0.9
     assert np.isfinite(table["soil_probability"]).all()
     assert "shows the ground" in ground.notes[-1]

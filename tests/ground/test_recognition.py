@@ -13,7 +13,7 @@ from terragrip.errors import InputError
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.emissions import Emissions
 from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
-from terragrip.ground.unknown import CELLS, ROUGHNESSES
+from terragrip.ground.unknown import CELLS
 from terragrip.soil.blocks import estimates_blocks
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.library import Soil, SoilLibrary
@@ -115,21 +115,6 @@ def test_twins_whose_few_blocks_scattered_otherwise_share_the_probability(librar
     soils = SoilLibrary({"fine": library["fine"], "twin": twin})
     timeline = analyse(drive(5, [("fine", FINE, 60)]), soils)[0].timeline
     assert timeline.probabilities[20:, 0] == pytest.approx(timeline.probabilities[20:, 1], abs=0.02)
-
-
-def test_slip_that_is_hardly_known_does_not_speak_for_the_flatter_curve():
-    """mu .1, which both soils bear, and slip .02 +- .15: one curve is as likely as the other, however flat."""
-    flat, steep = (Soil("", "exponential", {"a": a}, resistance=(0.12, 0.02)) for a in (0.5, 1.5))
-    blocks = estimates_blocks(drive(4, [("fine", FINE, 20)]))
-    blind = replace(
-        blocks,
-        slip=np.full_like(blocks.slip, 0.02),
-        slip_variance=np.full_like(blocks.slip, 0.15**2),
-        adhesion=np.full_like(blocks.slip, 0.1),
-    )
-    states = Emissions({"flat": flat, "steep": steep}).log_likelihood(blind, np.ones(len(blind)))
-    one, other = states[blind.known, 0], states[blind.known, ROUGHNESSES.size]
-    np.testing.assert_allclose(one, other, atol=0.03)
 
 
 def test_standing_still_carries_the_soil_on(library):

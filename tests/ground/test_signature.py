@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from ground_drives import COARSE, FINE, GRASS, Ground, drive
 from terragrip.errors import InputError
 from terragrip.soil.blocks import estimates_blocks
 from terragrip.soil.library import Soil, SoilLibrary
-from terragrip.soil.signature import Signature, learn_signature, signature_in
+from terragrip.soil.signature import Signature, _ground, learn_signature, signature_in
 
 
 def test_it_finds_what_the_drives_were_drawn_from(library):
@@ -56,10 +57,28 @@ def test_it_survives_the_library_file(library, tmp_path):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("level", [0.1]), ("level_sd", [0.0, 0.1]), ("roughness_covariance", [[1, 2], [2, 1]]),
+    [("level", [0.1]), ("level_sd", [0.0, 0.1]), ("roughness_covariance", [[1, 2], [2, 1]]), ("level_correlation", 1.0),
      ("level", [float("nan"), 0.0]), ("blocks", "many")],
 )  # fmt: skip
 def test_a_damaged_one_is_refused(library, key, value):
     data = {**signature_in(library["fine"]).to_dict(), key: value}
     with pytest.raises(InputError, match=r"soils\.fine\.signature: is not a signature"):
         Signature.from_dict(data, "soils.fine.signature")
+
+
+def test_the_ground_under_unequal_noise_is_paule_and_mandels():
+    rng = np.random.default_rng(4)
+    noise = 10 ** rng.uniform(-4, -1, (300, 2))
+    values = [0.4, 1.0] + np.sqrt(0.01 + noise) * rng.standard_normal((300, 2))
+    middle, sd = _ground(values, noise)
+    for k in range(2):
+
+        def mean_square(ground: float, x: np.ndarray = values[:, k], v: np.ndarray = noise[:, k]) -> float:
+            centre = np.average(x, weights=1 / (ground + v))
+            return float(np.mean((x - centre) ** 2 / (ground + v)))
+
+        ground = brentq(lambda g: mean_square(g) - 1, 1e-6, 1.0)
+        assert sd[k] == pytest.approx(np.sqrt(ground), rel=1e-3)
+        assert middle[k] == pytest.approx(
+            np.average(values[:, k], weights=1 / (ground + noise[:, k])), rel=1e-3
+        )

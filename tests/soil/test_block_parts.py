@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from terragrip.errors import InputError
+from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import Blocks, _streak, blocks_of, driven_wheels, wheel_loads
 from terragrip.soil.library import Soil
-from terragrip.soil.pair_density import log_density
 from terragrip.soil.signature import (
     Signature,
+    _correlation,
     _ground,
+    curve_error,
     learn_signature,
     signature_in,
     with_signatures,
@@ -160,49 +162,38 @@ def known_blocks(count: int = 40, seed: int = 2) -> Blocks:
     return replace(blocks, streak=np.full(count, 9))
 
 
-def test_a_pair_is_as_likely_as_all_true_ones_under_it_pulls_being_alike() -> None:
-    """Against a sum over true slips: each pull is equally likely before, and slips alike where the curve is flat."""
-    blocks, (spread, shift), share = known_blocks(), (0.2, -0.1), np.array([0.75, 0.25])
-    s = np.linspace(-0.6, 0.6, 200_001)
-    mu = SOIL.value(s)
-    middle, scale = mu + shift * (np.abs(mu) + 0.05), np.abs(mu) + 0.05
-    for block, density in zip(range(5), log_density(SOIL.value, blocks, spread, shift), strict=False):
-        slip, adhesion = blocks.mean_slip[block], blocks.mean_adhesion[block]
-        slip_sd, mu_sd = (np.sqrt(x[block]) @ share for x in (blocks.slip_variance, blocks.adhesion_variance))
-        sd = np.hypot(mu_sd, spread * scale)
-        both = np.exp(-0.5 * (((adhesion - middle) / sd) ** 2 + ((slip - s) / slip_sd) ** 2))
-        both /= 2 * np.pi * sd * slip_sd
-        whole = np.trapezoid(both * (np.abs(np.gradient(mu, s)) + 0.3), s)
-        assert density == pytest.approx(np.log(whole), abs=0.03)
-
-
-def test_what_is_learned_about_a_curve_is_what_the_ground_was_drawn_with() -> None:
-    draws, count = np.random.default_rng(5), 400
-    slip = draws.uniform(0.02, 0.3, (count, 1))
-    true = SOIL.value(slip) * 1.2 + 0.01 + 0.1 * (SOIL.value(slip) + 0.05) * draws.standard_normal((count, 1))
-    run = replace(
-        known_blocks(count),
-        slip=np.tile(slip, 2) + 0.02 * draws.standard_normal((count, 1)),
-        adhesion=np.tile(true, 2),
-        slip_variance=np.full((count, 2), 0.02**2),
-        adhesion_variance=np.full((count, 2), 1e-6),
-    )
-    signature = learn_signature(SOIL, [run])
-    assert signature is not None
-    assert signature.level[1] == pytest.approx(0.2, abs=0.03)
-    assert signature.level_sd[1] == pytest.approx(0.1, rel=0.3)
+def test_an_error_about_the_curve_is_relative_and_its_variance_goes_by_the_slope() -> None:
+    blocks = known_blocks()
+    error, variance, scale = curve_error(SOIL, blocks)
+    share, step = np.array([0.75, 0.25]), 1e-6
+    curve = CURVES["exponential"].value(blocks.slip, {"a": 0.9}) - 0.02
+    ahead = CURVES["exponential"].value(blocks.slip + step, {"a": 0.9}) - 0.02
+    np.testing.assert_allclose(scale, np.abs(curve @ share) + 0.05)
+    np.testing.assert_allclose(error, (blocks.adhesion - curve) @ share / scale)
+    slope = (ahead - curve) / step
+    known = np.sqrt(blocks.adhesion_variance + slope**2 * blocks.slip_variance) @ share
+    np.testing.assert_allclose(variance, (known / scale) ** 2, rtol=1e-4)
 
 
 def test_the_ground_under_noisy_values_is_paule_and_mandels() -> None:
     draws = np.random.default_rng(3)
-    noise = draws.uniform(0.5, 2.0, 400) * 1e-4
-    values = 0.1 + np.sqrt(4e-4 + noise) * draws.standard_normal(400)
+    noise = draws.uniform(0.5, 2.0, (400, 2)) * [1e-4, 1e-2]
+    values = [0.1, -0.2] + np.sqrt(np.add([4e-4, 4e-2], noise)) * draws.standard_normal((400, 2))
     middle, sd = _ground(values, noise)
-    weight = 1 / (sd**2 + noise)
-    assert middle == pytest.approx(np.average(values, weights=weight), rel=1e-6)
-    assert np.mean(weight * (values - middle) ** 2) == pytest.approx(1.0, abs=1e-6)
-    assert sd == pytest.approx(0.02, rel=0.15)
-    assert _ground(np.full(30, 0.3), noise[:30])[1] == 0.005
+    for k in range(2):
+        weight = 1 / (sd[k] ** 2 + noise[:, k])
+        assert middle[k] == pytest.approx(np.average(values[:, k], weights=weight), rel=1e-6)
+        assert np.mean(weight * (values[:, k] - middle[k]) ** 2) == pytest.approx(1.0, abs=1e-6)
+    assert sd == pytest.approx([0.02, 0.2], rel=0.15)
+    assert _ground(np.full((30, 2), 0.3), noise[:30])[1].tolist() == [0.005, 0.03]
+
+
+@pytest.mark.parametrize(("slope", "expected"), [(1.0, 0.9), (-1.0, -0.9), (0.0, 0.0)])
+def test_a_correlation_stays_within_nine_tenths(slope: float, expected: float) -> None:
+    x = np.linspace(-1.0, 1.0, 50)
+    assert _correlation(np.column_stack([x, slope * x])) == pytest.approx(expected)
+    y = 0.5 * x + np.random.default_rng(1).standard_normal(50)
+    assert _correlation(np.column_stack([x, y])) == pytest.approx(np.corrcoef(x, y)[0, 1])
 
 
 def test_a_signature_holds_level_and_roughness_of_all_runs() -> None:
@@ -213,10 +204,15 @@ def test_a_signature_holds_level_and_roughness_of_all_runs() -> None:
     rough = np.concatenate([run.roughness for run in runs])
     np.testing.assert_allclose(signature.roughness, rough.mean(axis=0))
     np.testing.assert_allclose(signature.roughness_covariance, np.cov(rough.T) + 0.01 * np.eye(2))
-    level, noise = (
-        np.concatenate([getattr(run, name) for run in runs]) for name in ("resistance", "resistance_variance")
+    level = np.concatenate([np.column_stack([run.resistance, curve_error(SOIL, run)[0]]) for run in runs])
+    noise = np.concatenate(
+        [np.column_stack([run.resistance_variance, curve_error(SOIL, run)[1]]) for run in runs]
     )
-    assert (signature.level[0], signature.level_sd[0]) == _ground(level, noise)
+    middle, sd = _ground(level, noise)
+    np.testing.assert_allclose(signature.level, middle)
+    np.testing.assert_allclose(signature.level_sd, sd)
+    scaled = (level - middle) / np.sqrt(sd**2 + noise)
+    assert signature.level_correlation == pytest.approx(np.corrcoef(scaled.T)[0, 1])
 
 
 @pytest.mark.parametrize(("known", "learned"), [(19, False), (20, True)])
@@ -243,7 +239,7 @@ def test_signatures_go_into_a_library_and_come_out_and_damaged_ones_are_refused(
         np.testing.assert_array_equal(getattr(again, one.name), getattr(signature, one.name))
     assert signature_in(SOIL) is None
     for wrong in (
-        {"level": [1.0]}, {"level_sd": [0.0, 1.0]}, {"blocks": None},
+        {"level": [1.0]}, {"level_sd": [0.0, 1.0]}, {"level_correlation": 1.0}, {"level_correlation": -1.0}, {"blocks": None},
         {"roughness": [np.nan, 0.0]}, {"roughness_covariance": [[1.0, 2.0], [2.0, 1.0]]},
     ):  # fmt: skip
         with pytest.raises(InputError, match=r"l\.json.*soils\.field\.signature.*is not a signature"):

@@ -29,8 +29,7 @@ from terragrip.ground.roughness import Roughness, shared
 from terragrip.ground.unknown import CELLS, ROUGHNESSES, UNKNOWN, cells, textures
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.library import Soil
-from terragrip.soil.pair_density import log_density
-from terragrip.soil.signature import Signature, relative_interval, signature_in
+from terragrip.soil.signature import Signature, curve_error, signature_in
 
 _CURVE_SPREAD = 0.10
 """SD of mu about its curve, relative, where a library does not state it."""
@@ -114,26 +113,38 @@ class Emissions:
             mine = weight * mixed(_level(soil, signature, blocks), level)
             if name not in self.roughness.means:
                 several = np.repeat(mine[:, None], ROUGHNESSES.size, axis=1)
-                columns.append(
-                    several if roughness is None else several + textures(roughness, self.roughness.covariance)
-                )
+                columns.append(several if roughness is None else several + textures(roughness))
                 continue
             if roughness is not None:
                 own = bivariate(roughness - self.roughness.means[name], self.roughness.covariance)
                 mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
             columns.append(mine[:, None])
-        return np.concatenate([*columns, cells(blocks, roughness, weight, self.roughness.covariance)], axis=1)
+        return np.concatenate([*columns, cells(blocks, roughness, weight)], axis=1)
 
     def _comparable(self, signature: Signature) -> bool:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by
 
 
 def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
-    """Log density of rho_s, mu and slip on a known soil, (blocks,)."""
+    """Log density of rho_s and mu on a known soil, (blocks,)."""
+    error, own, scale = curve_error(soil, blocks)
+    own = own + _relative_interval(soil) ** 2
     if signature is None:
         mean, sd = soil.resistance or BROAD_RESISTANCE
-        shift, spread = 0.0, float(np.hypot(_CURVE_SPREAD, relative_interval(soil) or 0.0))
-    else:
-        (mean, shift), (sd, spread) = signature.level, signature.level_sd
-    resistance = normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
-    return resistance + log_density(soil.value, blocks, spread, shift)
+        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale)
+        return mu + normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
+    first = np.sqrt(signature.level_sd[0] ** 2 + blocks.resistance_variance)
+    second = np.sqrt(signature.level_sd[1] ** 2 + own)
+    x, y = (blocks.resistance - signature.level[0]) / first, (error - signature.level[1]) / second
+    correlation = signature.level_correlation
+    covariance = np.array([[1.0, correlation], [correlation, 1.0]])
+    return bivariate(np.stack([x, y], axis=-1), covariance) - np.log(first * second * scale)
+
+
+def _relative_interval(soil: Soil) -> float:
+    """SD of the curve's first free parameter, its height, relative: its 95 % interval over 2 x 1.96; 0 where there is none."""
+    for name, (low, high) in soil.interval.items():
+        value = soil.parameters.get(name)
+        if value:
+            return float(abs(high - low) / (2 * 1.96 * abs(value)))
+    return 0.0

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import PERIOD, Blocks
-from terragrip.soil.pair_density import log_density
-from terragrip.soil.signature import LEVEL_TIME, USUAL_SD, usual_curve
+from terragrip.soil.signature import OFFSET, USUAL_CURVE
 
-ROUGHNESS_TIME = 1.3
+LEVEL_TIME, ROUGHNESS_TIME = 3.5, 1.3
 """Seconds for which neighbouring blocks repeat each other. All soils alike: else the sharper of two laws would win by its name."""
 LEVEL_WAY = 0.75
 """Lengths of vehicle and tool over which levels repeat each other: the same ground is under one wheel after the other."""
-BROAD_RESISTANCE = (0.12, 0.08)
-"""Mean and SD over all grounds of rho_s (0.02 to 0.3 on fields and roads; ASABE D497)."""
+BROAD_RESISTANCE, BROAD_SCALE = (0.12, 0.08), (USUAL_CURVE["a"], 0.5)
+"""Mean and SD over all grounds of rho_s (0.02 to 0.3 on fields and roads; ASABE D497) and of the scale of mu's curve."""
 ADHESION_ROUGHNESS = 0.6
 """ln SD within a block of mu, less that of rho_s: what the simulated campaign's soils have in the mean."""
 _BROAD_ROUGHNESS = (-5.6, 0.8)
@@ -56,10 +56,12 @@ def bivariate(off: Floats, covariance: Floats) -> Floats:
 
 
 def broad_level(blocks: Blocks) -> Floats:
-    """Log density of rho_s, mu and slip on any ground, mu about the usual curve (blocks,)."""
+    """Log density of rho_s and mu, independent and broad, mu about the paper's prototype curve (blocks,)."""
+    shape = CURVES["exponential"].value(blocks.mean_slip, {"a": 1.0})
+    spread = BROAD_SCALE[1] * np.abs(shape) + OFFSET
     mean, sd = BROAD_RESISTANCE
     resistance = normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
-    return resistance + log_density(usual_curve, blocks, USUAL_SD)
+    return resistance + normal(blocks.mean_adhesion - BROAD_SCALE[0] * shape, spread**2)
 
 
 def broad_roughness(roughness: Floats) -> Floats:

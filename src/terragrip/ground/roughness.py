@@ -14,14 +14,13 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.ground.laws import ROUGHNESS_TIME
-from terragrip.ground.unknown import ROUGHNESS_COVARIANCE
 from terragrip.soil.blocks import PERIOD
 from terragrip.soil.signature import Signature
 
 
 @dataclass(frozen=True)
 class Roughness:
-    """Means (2,) of soils by name, and the covariance (2, 2) of a block about its soil's; as `Signature` has them."""
+    """Means (2,) of soils by name, and the covariance (2, 2) of a block about its soil's (of no soil: ones); as `Signature` has them."""
 
     means: Mapping[str, Floats]
     covariance: Floats
@@ -31,7 +30,7 @@ def shared(signatures: Mapping[str, Signature]) -> Roughness:
     """The roughness of soils whose signatures hold one, and can be compared; the others are left out."""
     shown = {name: one for name, one in signatures.items() if one.roughness is not None}
     if not shown:
-        return Roughness({}, ROUGHNESS_COVARIANCE)
+        return Roughness({}, np.eye(2))
     blocks = np.array([one.blocks for one in shown.values()], dtype=float)
     covariance = np.average([one.roughness_covariance for one in shown.values()], axis=0, weights=blocks)
     means = np.array([one.roughness for one in shown.values()])

@@ -7,8 +7,6 @@ there are many cells, each as probable as the rest, is what a known soil that fi
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from terragrip.arrays import Floats
@@ -23,8 +21,8 @@ from terragrip.ground.laws import (
     tempered,
 )
 from terragrip.physics.adhesion import CURVES
-from terragrip.soil.blocks import Blocks
-from terragrip.soil.pair_density import log_density
+from terragrip.soil.blocks import LARGEST_SLIP, Blocks
+from terragrip.soil.signature import OFFSET
 
 UNKNOWN = "unknown"
 
@@ -34,8 +32,6 @@ SCALES = np.array([0.15, 0.22, 0.33, 0.47, 0.66, 0.9, 1.2, 1.6])
 """Scale a of the paper's prototype curve: ice to dry concrete."""
 ROUGHNESSES = np.array([-6.4, -5.7, -5.0, -4.3])
 """ln of rho_s's SD within a block."""
-_WIDTH = 0.7
-"""Between roughnesses: each stands for all as near to it."""
 GRID = RESISTANCES.size * SCALES.size * ROUGHNESSES.size
 CELLS = GRID + 1
 """How many soils the unknown one may be; the last is none on the grid, of the broad law alone."""
@@ -44,12 +40,10 @@ CELLS = GRID + 1
 _SCALE_SPREAD = 0.12
 _RESISTANCE_SPREAD = 5.0  # SD of a block's rho_s over the SD within blocks: rough soils vary at every length
 _LEAST_RESISTANCE_SD = 0.01
-ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
+_ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 
 
-def cells(
-    blocks: Blocks, roughness: Floats | None, weight: Floats, covariance: Floats = ROUGHNESS_COVARIANCE
-) -> Floats:
+def cells(blocks: Blocks, roughness: Floats | None, weight: Floats) -> Floats:
     """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known;
     `weight` (blocks,): what each block's level counts for."""
     rows = len(blocks)
@@ -61,23 +55,30 @@ def cells(
     resistance = normal(off, spread[:, None] + blocks.resistance_variance[:, None, None])[:, :, None, :]
     out = weight[:, None, None, None] * mixed(adhesion + resistance, broad)
     if roughness is not None:
-        out = out + textures(roughness, covariance)[:, :, None, None]
+        out = out + textures(roughness)[:, :, None, None]
     none = weight * level
     if roughness is not None:
         none = none + tempered(broad_roughness(roughness), ROUGHNESS_TIME)
     return np.column_stack([out.reshape(rows, GRID), none])
 
 
-def textures(roughness: Floats, covariance: Floats = ROUGHNESS_COVARIANCE) -> Floats:
+def textures(roughness: Floats) -> Floats:
     """Tempered log likelihoods (blocks, ROUGHNESSES) of the roughness alone."""
     middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
-    mine = bivariate(roughness[:, None, :] - middle, covariance + _WIDTH**2 / 12 * np.eye(2))
+    mine = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
     return tempered(mixed(mine, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)
 
 
 def _adhesion(blocks: Blocks) -> Floats:
-    """Log density of mu and slip about the curve of each scale, (blocks, scales)."""
+    """Log density of mu about the curve of each scale, (blocks, scales); as `signature.curve_error` has it."""
     curve = CURVES["exponential"]
-    return np.column_stack(
-        [log_density(partial(curve.value, parameters={"a": a}), blocks, _SCALE_SPREAD) for a in SCALES]
+    shape = (curve.value(blocks.slip, {"a": 1.0}) * blocks.share).sum(axis=1)[:, None]
+    height = curve.value(np.array([LARGEST_SLIP]), {"a": 1.0})
+    by_slip = np.minimum(
+        np.abs(curve.slope(blocks.slip, {"a": 1.0})) * np.sqrt(blocks.slip_variance), 0.5 * height
     )
+    scale = SCALES * np.abs(shape) + OFFSET
+    error = (blocks.mean_adhesion[:, None] - SCALES * shape) / scale
+    known = np.hypot(np.sqrt(blocks.adhesion_variance)[:, None, :], SCALES[:, None] * by_slip[:, None, :])
+    own = ((known * blocks.share[:, None, :]).sum(axis=2) / scale) ** 2
+    return normal(error, _SCALE_SPREAD**2 + own) - np.log(scale)
