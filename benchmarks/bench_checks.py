@@ -40,9 +40,9 @@ BEGIN = "<!-- made by benchmarks/bench_checks.py --write -->"
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/checks.md"
 RATES = (None, 100.0, 20.0, 10.0)
 LIMITS = {
-    "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST",
+    "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST _SHORT _FEWEST _LEAP",
     "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
-    "frozen": "_TIMES _FINE _NOISY _CHANGED _COARSE _SEVERAL _CHANGES _GAINED",
+    "frozen": "_TIMES _FINE _NOISY _CHANGED _COARSE _SEVERAL _CHANGES _GAINED _OFTEN _SECOND _RUN _RESOLVED",
     "cut": "_SHARE _LEAST _OFTENER _TIMES _FINE _NOISY",
     "turns": "SURE LEAST_TURN _CLEAR _SIZES _WIDE _OTHER _SURELY",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
@@ -56,7 +56,7 @@ LIMITS = {
     "pitch": "_LONG _MOVED _BEYOND",
     "level_shift": "_STAYS",
     "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
-    "leaps": "_LEAST _BEYOND _SURE _HALF _REST",
+    "leaps": "_LEAST _BEYOND _SURE _STEPS _HALF _REST",
     "mechanics": "_STRETCH _OFFSET",
     "plain_units": "_ON_TIME",
     "sides": "_APART _SPUN",
