@@ -89,3 +89,6 @@ def test_torques_that_read_the_same_in_every_stop_are_named() -> None:
     one = {"drive_torque_l": torque, "drive_torque_r": torque - 9}  # 2 % of its load, 1 % of the weight
     (note,) = torque_rest_warnings(Recording(TIME, {**stopping().channels, **one}), CART)
     assert "(r -9 N m)" in note
+    early = TIME < 120  # two stops: what holds the wheels agrees by chance
+    channels = {n: v[early] for n, v in {**stopping().channels, **one}.items()}
+    assert torque_rest_warnings(Recording(TIME[early], channels), CART) == []

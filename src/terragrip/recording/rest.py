@@ -24,7 +24,10 @@ _FEWEST = 4  # values of a stop
 _SHIFT = 0.03  # of the usual speed, which slip is off by
 _SURE = 4.0  # standard deviations at rest: noise without a sign has a mean of 1.9 of its own (Rayleigh)
 _ALIKE = 0.5  # of the shift, by which stops differ
-_HELD = 0.1  # of a torque, likewise: motors that hold a vehicle do so on one slope and another
+_HELD = (
+    0.1  # of a torque, likewise: motors that hold a vehicle, or each other, do so on one slope and another,
+)
+_STOPS = 3  # and in two stops as much by chance (2 notes on the few of 96 right drives that had two)
 _THRUST = 0.01  # of the weight
 _ONE_WHEEL = 0.02  # of its share of it
 _SLOPE = 0.3  # of a thrust, that a measured slope explains
@@ -57,7 +60,7 @@ def rest_warnings(recording: Recording) -> list[str]:
 
 
 def torque_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence on drive torques that read one and the same value, not 0, in two long stops of all wheels or more.
+    """A sentence on drive torques that read one and the same value, not 0, in three long stops of all wheels or more.
 
     A motor that holds the vehicle reads as much as the slope asks for, which differs from stop to stop.
     """
@@ -69,7 +72,7 @@ def torque_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         for stop in _stops(recording)[0]
         if read and all(len(_known(values[stop])) >= _FEWEST for values in read.values())
     ]
-    if len(stops) < 2:
+    if len(stops) < _STOPS:
         return []
     places = [vehicle.wheels.index(w) for w in read]
     weight, radius = GRAVITY * vehicle.mass, vehicle.wheel_radius[places]
