@@ -147,7 +147,7 @@ def _with_adhesion(estimates: list[Path]) -> tuple[list[Path], list[Path]]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from terragrip.estimation.estimates import wheels_with
+    from terragrip.estimation.columns import wheels_with
 
     def has_adhesion(path: Path) -> bool:
         try:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 from terragrip.recording.schema import REFERENCE, unit_of
 
@@ -94,3 +95,17 @@ def _of_a_part(name: str) -> Column | None:
             )
             return Column(column.unit, column.description.format(part))
     return None
+
+
+def wheels_with(quantity: str, columns: Iterable[str]) -> tuple[str, ...]:
+    """The wheels with a column ``<quantity>_<wheel>`` (other than a ``_std``), in the columns' order."""
+    begin = f"{quantity}_"
+    return tuple(n.removeprefix(begin) for n in columns if n.startswith(begin) and not n.endswith("_std"))
+
+
+def driven_of(wheels: Iterable[str], about: Mapping[str, Any]) -> tuple[str, ...]:
+    """The wheels without those of axles that the vehicle of estimates (``about``) does not drive; all, where none is left."""
+    axles = (about.get("vehicle") or {}).get("axles", {}).values()
+    free = {wheel for axle in axles if axle.get("driven") is False for wheel in axle["wheels"]}
+    every = tuple(wheels)
+    return tuple(wheel for wheel in every if wheel not in free) or every

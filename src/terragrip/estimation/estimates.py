@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
 from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
-from terragrip.estimation.columns import column_named
+from terragrip.estimation.columns import column_named, wheels_with
 from terragrip.estimation.engine import EVENTS
 from terragrip.recording.clock import clock_index
 
@@ -30,20 +30,6 @@ if TYPE_CHECKING:
 
 METADATA_KEY = b"terragrip"
 """Under it a Parquet file holds, as JSON, what the table was made from."""
-
-
-def wheels_with(quantity: str, columns: Iterable[str]) -> tuple[str, ...]:
-    """The wheels with a column ``<quantity>_<wheel>`` (other than a ``_std``), in the columns' order."""
-    begin = f"{quantity}_"
-    return tuple(n.removeprefix(begin) for n in columns if n.startswith(begin) and not n.endswith("_std"))
-
-
-def driven_of(wheels: Iterable[str], about: Mapping[str, Any]) -> tuple[str, ...]:
-    """The wheels without those of axles that the vehicle of estimates (``about``) does not drive; all, where none is left."""
-    axles = (about.get("vehicle") or {}).get("axles", {}).values()
-    free = {wheel for axle in axles if axle.get("driven") is False for wheel in axle["wheels"]}
-    every = tuple(wheels)
-    return tuple(wheel for wheel in every if wheel not in free) or every
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from terragrip.estimation.columns import driven_of
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.engine import EVENTS
-from terragrip.estimation.estimates import driven_of
 from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terragrip.estimation.columns import driven_of, wheels_with
 from terragrip.estimation.engine import EVENTS
-from terragrip.estimation.estimates import driven_of, wheels_with
 from terragrip.estimation.summary import STANDSTILL
 
 if TYPE_CHECKING:

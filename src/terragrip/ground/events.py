@@ -9,8 +9,8 @@ import numpy as np
 
 from terragrip.arrays import Floats, Ints
 from terragrip.estimation import Estimates
+from terragrip.estimation.columns import driven_of, wheels_with
 from terragrip.estimation.engine import EVENTS, SIGNS
-from terragrip.estimation.estimates import driven_of, wheels_with
 from terragrip.estimation.settings import WITHOUT_TORQUE, watch_limits
 from terragrip.ground.span import Span
 

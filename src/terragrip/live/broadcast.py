@@ -13,8 +13,8 @@ import struct
 from collections.abc import AsyncGenerator, Sequence
 
 from terragrip import __version__
+from terragrip.estimation.columns import wheels_with
 from terragrip.estimation.engine import EVENTS
-from terragrip.estimation.estimates import wheels_with
 from terragrip.live.message import ESTIMATE, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri

@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.columns import wheels_with
 from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.engine import estimate_slots
 from terragrip.estimation.engine_estimator import EngineEstimator, live_estimator, restored
-from terragrip.estimation.estimates import wheels_with
 from terragrip.estimation.estimator import Estimate, TractionEstimator, default_channels
 from terragrip.estimation.learning import SettingsLearner
 from terragrip.estimation.methods import DEFAULT

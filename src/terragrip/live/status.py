@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
-from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.columns import wheels_with
 from terragrip.live.core import Row
 from terragrip.live.message import EVENT, Message
 

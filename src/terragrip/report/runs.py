@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
-from terragrip.estimation.estimates import driven_of, wheels_with
+from terragrip.estimation.columns import driven_of, wheels_with
 from terragrip.report.clock import Clock
 from terragrip.units import STANDARD_GRAVITY
 

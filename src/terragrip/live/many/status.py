@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from terragrip.estimation.estimates import wheels_with
+from terragrip.estimation.columns import wheels_with
 
 if TYPE_CHECKING:
     from terragrip.live.many.service import ManyService
