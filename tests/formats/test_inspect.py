@@ -90,6 +90,7 @@ def test_a_ready_log_needs_no_profile(tmp_path: Path, log: pd.DataFrame) -> None
     assert speed.noise == pytest.approx(0.02, rel=0.3)
     assert (speed.minimum, speed.maximum) == (log["ground_speed"].drop(range(100, 180)).min(), speed.maximum)
     assert any("pitch" in sentence for sentence in inspection.missing)
+    assert inspection.to_text().count("the vehicle is assumed to tow nothing") == 1
     assert "can be estimated as it is" in inspection.to_text()
     json.dumps(inspection.to_dict(), allow_nan=False)
 

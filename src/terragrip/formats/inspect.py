@@ -24,7 +24,7 @@ from terragrip.formats.table import LogTable, Sparse
 from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.checks import refuse_estimates
+from terragrip.recording.checks import NOTHING_TOWED, refuse_estimates
 from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
@@ -133,7 +133,9 @@ def inspect(
     fits = Fit()
     try:
         recording = _recording(log, chosen)
-        warnings += [note for note in recording.notes if note not in warnings]
+        warnings += [
+            note for note in recording.notes if note not in (*warnings, NOTHING_TOWED)
+        ]  # missing, below
     except InputError as error:
         if profile is not None:
             raise

@@ -14,6 +14,7 @@ from terragrip.formats.recognition import Proposal
 from terragrip.formats.time_column import TimeColumn
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording import Recording
+from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.schema import has_engine_torque, has_torque, wheel_names_in
 
 if TYPE_CHECKING:
@@ -69,8 +70,8 @@ def missing_channels(
         for wheel in without
         if driven.get(wheel, True)
     ]
-    if "drawbar_force" not in proposals:
-        notes.append("No drawbar force was found: the vehicle is assumed to tow nothing.")
+    stated = vehicle is not None and vehicle.uncertainty.drawbar_force is not None
+    notes += [NOTHING_TOWED] * ("drawbar_force" not in proposals and not stated)
     if "acceleration_x" not in proposals:
         notes.append(
             "No acceleration_x was found: soil resistance is estimated from speed alone, more slowly."
