@@ -14,7 +14,7 @@ import made_up
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.report import soil_sections, trust_sections
-from terragrip.report.curves import SoilCurves, draw_fits, maxima
+from terragrip.report.curves import SoilCurves, draw_both_maxima, draw_fits, maxima
 from terragrip.report.page import Picture, Section, Table
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
@@ -169,6 +169,21 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
         assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), rtol=1e-9)
         assert mine.learned.curve.bins_.to_list() == theirs.learned.curve.bins_.to_list()
     assert "terragrip soils" in (trust_sections.what_is_missing(shown).omitted or "")
+
+
+def test_what_lies_beyond_the_bins_is_not_drawn_as_known(curves: list[SoilCurves]) -> None:
+    """Curves fitted up to 3 or 6 % of slip were 40 to 90 % off at 20 %, with the badge, a full line and a marked maximum there."""
+    shown = curves[0]
+    peaks = maxima(shown.learned.soil, 0.02)
+    assert peaks.efficiency[0] < shown.reach < peaks.adhesion[0]
+    (table,) = tables(soil_sections.both_maxima(curves, 0.02))
+    row = dict(zip(table.header, table.rows[0], strict=True))
+    assert row["largest µ"].endswith(", beyond the data")
+    assert "beyond" not in row["largest η"]
+    drawn = draw_both_maxima(shown, 0.02)
+    assert drawn.count("beyond the data") == 1
+    assert "opacity: 0.6" in draw_fits([shown])
+    assert "opacity: 0.08" in draw_fits([shown])
 
 
 def test_a_library_carries_the_band_of_a_curve_with_several_free_parameters(tmp_path: Path) -> None:

@@ -58,6 +58,12 @@ class SoilCurves:
         return self.learned.curve.identifiability_.identifiable and self.learned.curve.has_band
 
     @property
+    def reach(self) -> float:
+        """The largest slip of the bins: beyond it a curve rests on its form alone. Infinite for a curve without bins."""
+        bins = self.learned.curve.bins_
+        return float(bins.slip[bins.used].max()) if bins.used.any() else np.inf
+
+    @property
     def by_slip(self) -> AdhesionCurve | None:
         """The paper's fit where it stands beside another; None where it is the one that counts."""
         return None if self.learned.by_slip is self.learned.curve else self.learned.by_slip
@@ -124,7 +130,8 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
                 ("adhesion µ", soil.value(slip), BLUE),
                 ("efficiency η", eta, GREEN),
             ):
-                plot.plot(slip, values, color=INK if ending else color, label=f"{label}{ending}", **style)
+                drawn = {"color": INK if ending else color, "label": f"{label}{ending}", **style}
+                _draw_line(plot, slip, values, np.inf if ending else curve.reach, drawn)
         peaks = maxima(curve.learned.soil, tire_resistance)
         for (at, height), what, color, marker in (
             (peaks.adhesion, "µ", BLUE, "o"),
@@ -133,6 +140,7 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
             if np.isfinite(at):
                 plot.plot([at], [height], marker, color=color, markersize=7)
                 sentence = f"largest {what}: {height:.2f} at {100 * at:.0f} % slip"
+                sentence += ", beyond the data" * (at > curve.reach)
                 plot.annotate(
                     sentence, (at, height), (9, 9), textcoords="offset points", color=INK, fontsize=9
                 )
@@ -154,10 +162,13 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
         for curve in curves:
             soil, color = curve.learned.soil, soil_color(curve.name, names)
             peaks = maxima(soil, tire_resistance)
-            left.plot(slip, soil.value(slip), color=color, label=curve.name, **_line(curve))
-            right.plot(slip, _efficiency(soil, slip, tire_resistance), color=color, **_line(curve))
-            left.plot([peaks.adhesion[0]], [peaks.adhesion[1]], "o", color=color, markersize=5)
-            right.plot([peaks.efficiency[0]], [peaks.efficiency[1]], "s", color=color, markersize=5)
+            style = {"color": color, "label": curve.name, **_line(curve)}
+            _draw_line(left, slip, soil.value(slip), curve.reach, style)
+            eta = _efficiency(soil, slip, tire_resistance)
+            _draw_line(right, slip, eta, curve.reach, {**style, "label": None})
+            for plot, (at, height), marker in ((left, peaks.adhesion, "o"), (right, peaks.efficiency, "s")):
+                fill = "none" if at > curve.reach else "full"
+                plot.plot([at], [height], marker, color=color, markersize=5, fillstyle=fill)
         for plot, label in ((left, "adhesion µ [–]"), (right, "tractive efficiency η [–]")):
             name_axis(plot.xaxis, "slip s [%]")
             plot.set_ylabel(label)
@@ -179,7 +190,11 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
         named["bins by pull, mean ± SD"] = _draw_bins(plot, counts, "o", BLUE, 3.5)
     if shown.learned.curve.has_band:
         low, high = shown.learned.curve.band(SLIPS)
-        named["95 % of the fit"] = plot.fill_between(SLIPS, low, high, color=BLUE, alpha=0.22, linewidth=0)
+        within = shown.reach >= SLIPS
+        for where, alpha in ((~within, 0.08), (within, 0.22)):
+            named["95 % of the fit"] = plot.fill_between(
+                SLIPS, low, high, where=where, color=BLUE, alpha=alpha, linewidth=0
+            )
     lines: list[tuple[str, Floats | None, dict[str, Any]]] = [
         (
             "fit to the bins" + (" by pull" if by_pull else "") + ("" if shown.sure else ", a hint only"),
@@ -196,9 +211,20 @@ def _draw_fit(plot: Axes, shown: SoilCurves) -> dict[str, Any]:
     ]
     for label, values, style in lines:
         if values is not None:
-            (named[label],) = plot.plot(SLIPS, values, **style)
+            named[label] = _draw_line(
+                plot, SLIPS, values, shown.reach if style["color"] == BLUE else np.inf, style
+            )
     plot.set_xlim(0, SLIPS[-1])
     return named
+
+
+def _draw_line(plot: Axes, slip: Floats, values: Floats, reach: float, style: dict[str, Any]) -> Any:
+    """A curve, pale and dotted beyond the data; what stands in the legend."""
+    within = slip <= reach
+    beyond = slip >= slip[within].max(initial=0.0)
+    (line,) = plot.plot(slip[within], values[within], **style)
+    plot.plot(slip[beyond], values[beyond], **{**style, "linestyle": ":", "alpha": 0.6, "label": None})
+    return line
 
 
 def _line(curve: SoilCurves) -> dict[str, Any]:

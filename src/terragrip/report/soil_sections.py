@@ -253,6 +253,7 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
             row += [
                 f"{number(height, 2)} at {percent(at, 0)}"
                 + ", a hint" * (soil is not one.truth and not one.sure)
+                + ", beyond the data" * (soil is not one.truth and one.sure and at > one.reach)
                 if at == at
                 else "–"
                 for at, height in (peaks.adhesion, peaks.efficiency)
@@ -260,7 +261,8 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
         resistance = one.learned.soil.resistance
         rows.append((*row, number(resistance[0] if resistance else None)))
     return Table(
-        "The largest adhesion and the largest tractive efficiency of each soil, and the slips where they lie.",
+        "The largest adhesion and the largest tractive efficiency of each soil, and the slips where they lie. Beyond the data a curve "
+        "rests on its form alone.",
         (
             "soil",
             "largest µ",
@@ -275,9 +277,9 @@ def _maxima_table(curves: Sequence[SoilCurves], tire_resistance: float) -> Table
 def _sources(curves: Sequence[SoilCurves]) -> str:
     both = _both(curves)
     notes = ["mean and SD of each bin" + " by pull and by slip" * both]
-    notes += ["the fit" + " to those by pull" * both + " with its 95 % interval"] + [
-        "the paper's fit by slip"
-    ] * both
+    notes += [
+        "the fit" + " to those by pull" * both + " with its 95 % interval, pale and dotted beyond the data"
+    ] + ["the paper's fit by slip"] * both
     for field, what in (
         ("paper", "the paper's curve"),
         ("truth", "the simulated truth"),
