@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError
-from terragrip.physics.loads import point_load_shares
+from terragrip.physics.loads import axle_loads, point_load_shares
 from terragrip.vehicle_parts import (
     NAME,
     Antenna,
@@ -268,6 +268,19 @@ class Vehicle(Part):
     def hitch_share(self) -> Floats:
         """Share of a vertical load on the hitch that each axle carries (axles,); below 0 where the load lifts it."""
         return _frozen(point_load_shares(self.axle_to_rear, -self.hitch_overhang))
+
+    def axle_loads(self, axle_mass: npt.ArrayLike | None = None, **motion: npt.ArrayLike) -> Floats:
+        """Vertical load of each axle [N] by `terragrip.physics.loads.axle_loads`, (..., axles): of this machine with ``axle_mass``
+        (axles,) [kg], None: its own; ``motion``: drawbar, hitch_load, acceleration, slope, spin_torque."""
+        loads: Floats = axle_loads(
+            self.axle_mass if axle_mass is None else axle_mass,
+            self.axle_to_rear,
+            center_of_gravity_height=self.center_of_gravity_height,
+            hitch_height=self.hitch_height,
+            hitch_overhang=self.hitch_overhang,
+            **motion,  # type: ignore[arg-type]
+        )
+        return loads
 
     def loaded(self, mass: float) -> Self:
         """The vehicle at ``mass`` [kg], with the difference at `payload`; raises InputError where an axle would lift."""

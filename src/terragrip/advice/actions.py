@@ -9,7 +9,6 @@ import numpy as np
 from terragrip.advice.optimum import Best, OverSlip
 from terragrip.advice.result import Action
 from terragrip.arrays import Floats
-from terragrip.physics.loads import axle_loads
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
 
@@ -165,14 +164,7 @@ def _split(work: Work, vehicle: Vehicle) -> list[Action]:
     """The loads of two axles at the advised pull, by the quasi-static formula (physics.md 3)."""
     if len(vehicle.axles) != 2:
         return []
-    load = axle_loads(
-        vehicle.axle_mass,
-        vehicle.axle_to_rear,
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        hitch_height=vehicle.hitch_height,
-        hitch_overhang=vehicle.hitch_overhang,
-        drawbar=max(work.best.net_traction, 0.0) * vehicle.mass * STANDARD_GRAVITY,
-    )
+    load = vehicle.axle_loads(drawbar=max(work.best.net_traction, 0.0) * vehicle.mass * STANDARD_GRAVITY)
     share = float(load[0] / load.sum())
     if share >= STEERING:
         return []

@@ -10,7 +10,6 @@ from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
 from terragrip.arrays import Floats
-from terragrip.physics.loads import axle_loads
 from terragrip.soil.estimates import torque_scale_sd, zero_slip_sd
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
@@ -106,14 +105,7 @@ def driven_share(vehicle: Vehicle, samples: Samples | None) -> tuple[float, floa
     """The driven axles' share of the weight without a pull, and what each pull of the weight adds (physics.md 3); by the rows' loads
     where there are some, else at rest."""
     weight = float(vehicle.mass) * STANDARD_GRAVITY
-    load = axle_loads(
-        vehicle.axle_mass,
-        vehicle.axle_to_rear,
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        hitch_height=vehicle.hitch_height,
-        hitch_overhang=vehicle.hitch_overhang,
-        drawbar=np.array([0.0, weight]),
-    )
+    load = vehicle.axle_loads(drawbar=np.array([0.0, weight]))
     drives = np.array([axle.driven for axle in vehicle.axles.values()])
     share = load[:, drives].sum(axis=1) / load.sum(axis=1)
     rest, transfer = float(share[0]), float(share[1] - share[0])

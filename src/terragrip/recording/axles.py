@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.physics.loads import axle_loads
 from terragrip.recording.mechanics import Means
 from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
@@ -127,12 +126,8 @@ def _difference(
 ) -> float:  # fmt: skip
     """The logarithm of one axle's thrust over load, over that of another: median of the windows; 0 where one brakes or lifts."""
     climb = 0.0 if means.climb is None else np.nan_to_num(means.climb)
-    loads = axle_loads(
+    loads = vehicle.axle_loads(
         masses,
-        vehicle.axle_to_rear,
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        hitch_height=vehicle.hitch_height,
-        hitch_overhang=vehicle.hitch_overhang,
         drawbar=pull,
         acceleration=means.change,
         slope=np.arcsin(np.clip(climb / STANDARD_GRAVITY, -1.0, 1.0)),

@@ -10,7 +10,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.physics.adhesion import CURVES
-from terragrip.physics.loads import GRAVITY, axle_loads
+from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_maker.fields import Signals
@@ -85,14 +85,7 @@ def _wheels(
 ) -> tuple[Floats, Floats]:
     """Wheel speeds [rad/s] and torques [N m] (n, wheels): driven wheels share one adhesion, the others roll."""
     push = np.gradient(ground, time)
-    loads = axle_loads(
-        vehicle.axle_mass,
-        vehicle.axle_to_rear,
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        hitch_height=vehicle.hitch_height,
-        drawbar=pull,
-        acceleration=push,
-    )
+    loads = vehicle.axle_loads(drawbar=pull, acceleration=push)
     load = (loads / np.bincount(vehicle.wheel_axle))[:, vehicle.wheel_axle]
     radius, driven = vehicle.wheel_radius, vehicle.driven
     moves = (ground > 0).astype(float)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.physics.loads import GRAVITY, axle_loads, wheel_shares
+from terragrip.physics.loads import GRAVITY, wheel_shares
 from terragrip.recording import Recording
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
@@ -179,12 +179,7 @@ def wheel_loads(
 
     push is dv/dt + g sinθ [m/s²], slope θ [rad], lateral a_y [m/s²], all (n,).
     """
-    axles = axle_loads(
-        vehicle.axle_mass,
-        vehicle.axle_to_rear,
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        hitch_height=vehicle.hitch_height,
-        hitch_overhang=vehicle.hitch_overhang,
+    axles = vehicle.axle_loads(
         drawbar=drawbar,
         acceleration=push - GRAVITY * np.sin(slope),
         slope=slope,
