@@ -24,10 +24,8 @@ _FEWEST = 4  # values of a stop
 _SHIFT = 0.03  # of the usual speed, which slip is off by
 _SURE = 4.0  # standard deviations at rest: noise without a sign has a mean of 1.9 of its own (Rayleigh)
 _ALIKE = 0.5  # of the shift, by which stops differ
-_HELD = (
-    0.1  # of a torque, likewise: motors that hold a vehicle, or each other, do so on one slope and another,
-)
-_STOPS = 3  # and in two stops as much by chance (2 notes on the few of 96 right drives that had two)
+_HELD = 0.1  # of a torque, likewise: motors hold a vehicle, or each other, on one slope and another
+_STOPS = 3  # two agree by chance (2 notes on the few of 96 right drives that had two)
 _THRUST = 0.01  # of the weight
 _ONE_WHEEL = 0.02  # of its share of it
 _SLOPE = 0.3  # of a thrust, that a measured slope explains
