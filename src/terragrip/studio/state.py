@@ -79,7 +79,9 @@ class Studio:
 
     def prepare_maps(self) -> None:
         """Load what reads a map where the folder holds one: half of what the first map's opening took."""
-        if any(self.folder.root.glob("**/*.gpkg")) and find_spec("pyogrio"):
+        # os.walk passes over what goes meanwhile, the folder itself included
+        names = (name for _, _, files in os.walk(self.folder.root) for name in files)
+        if any(name.endswith(".gpkg") for name in names) and find_spec("pyogrio"):
             import_module("pyogrio")
             import_module("pyproj")
 
