@@ -240,7 +240,7 @@ def test_signatures_go_into_a_library_and_come_out_and_damaged_ones_are_refused(
     assert signature_in(SOIL) is None
     for wrong in (
         {"level": [1.0]}, {"level_sd": [0.0, 1.0]}, {"level_correlation": 1.0}, {"level_correlation": -1.0}, {"blocks": None},
-        {"roughness": [np.nan, 0.0]}, {"roughness_covariance": [[1.0, 2.0], [2.0, 1.0]]},
+        {"blocks": 0}, {"roughness": [np.nan, 0.0]}, {"roughness_covariance": [[1.0, 2.0], [2.0, 1.0]]},
     ):  # fmt: skip
         with pytest.raises(InputError, match=r"l\.json.*soils\.field\.signature.*is not a signature"):
             Signature.from_dict({**signature.to_dict(), **wrong}, "soils.field.signature", "l.json")

@@ -69,7 +69,7 @@ class Signature:
             sound = all(np.isfinite(x).all() for x in arrays.values()) and bool(
                 (arrays["level_sd"] > 0).all()
             )
-            sound &= abs(correlation) < 1
+            sound &= abs(correlation) < 1 and min(counts.values()) > 0
         except (KeyError, TypeError, ValueError, np.linalg.LinAlgError):
             sound = False
         if not sound:
