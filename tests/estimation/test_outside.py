@@ -288,6 +288,6 @@ def test_a_caster_without_a_drive_has_a_bearing_resistance_of_its_own() -> None:
         columns[f"drive_torque_{wheel}"] = 0.2 * (0.02 * 75 * G + 1.5 / 0.2) + 0.05 * rng.standard_normal(
             len(time)
         )
-    told = estimate(Recording.from_frame(columns), cart)
-    assert float(told["adhesion_c"][-1]) == pytest.approx(0, abs=0.005)
-    assert float(told["soil_resistance"][-1]) == pytest.approx(0.04, abs=0.005)
+    estimates = estimate(Recording.from_frame(columns), cart)
+    assert float(estimates["adhesion_c"][-1]) == pytest.approx(0, abs=0.005)
+    assert float(estimates["soil_resistance"][-1]) == pytest.approx(0.04, abs=0.005)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from terragrip.advice.fuel import fuel_rate_of
 from terragrip.arrays import Floats
 from terragrip.estimation import Estimates
+from terragrip.estimation.provenance import measures
 from terragrip.soil.estimates import whole_length
 from terragrip.soil.transitions import settled
 from terragrip.vehicle import Vehicle
@@ -151,8 +152,7 @@ def _of_table(
     stretch = number * 1_000_000 + np.floor(np.nan_to_num(distance) / length).astype(np.int64)
     each = np.stack([estimates[f"adhesion_{w}"] for w in wheels], axis=1)
     fuel = fuel_rate_of(estimates)
-    channels = estimates.about.get("settings", {}).get("channels")
-    towed = not channels or "drawbar_force" in channels
+    towed = measures(estimates.about, "drawbar_force")
     slip_std, adhesion_std = mean("slip_{}_std"), mean("adhesion_{}_std")
     for name in sorted(set(labels[good])):
         rows = good & (labels == name)

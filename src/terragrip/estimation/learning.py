@@ -79,9 +79,8 @@ class SettingsLearner:
         self._missing = (math.nan,) * len(channels)
         self._number = 0  # of the chunk that is open
         self._every = 1
-        self._doubtful: dict[
-            str, int
-        ] = {}  # evaluations in a row that found something, by check; kept once they were two, and said
+        # Evaluations in a row that found something, by check; kept once they were two, and said.
+        self._doubtful: dict[str, int] = {}
         self._open = array("d")  # rows one behind the other: time, then the channels
         self._began = math.nan
         self._rows = 0

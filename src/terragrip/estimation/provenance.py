@@ -79,6 +79,12 @@ def settings_of(
     return known
 
 
+def measures(about: Mapping[str, Any], channel: str) -> bool:
+    """Whether a channel is in the log of estimates with this origin; True where it does not say what is."""
+    channels = about.get("settings", {}).get("channels")
+    return not channels or channel in channels
+
+
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from terragrip.estimation.columns import driven_of
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.engine import EVENTS
+from terragrip.estimation.provenance import measures
 from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
@@ -121,16 +122,15 @@ def _by_wheel(tally: Tally, columns: Columns) -> list[str]:
 def _by_each(tally: Tally) -> tuple[str, ...]:
     """What is shown of each wheel: an efficiency where the pull is measured, or the vehicle file says how large it may be."""
     stated = _uncertainty(tally).get("drawbar_force") is not None
-    return ("slip", "adhesion", "efficiency") if stated or _has_cell(tally) else ("slip", "adhesion")
+    return (
+        ("slip", "adhesion", "efficiency")
+        if stated or measures(tally.about, "drawbar_force")
+        else ("slip", "adhesion")
+    )
 
 
 def _uncertainty(tally: Tally) -> dict[str, float | None]:
     return tally.about.get("vehicle", {}).get("uncertainty") or {}
-
-
-def _has_cell(tally: Tally) -> bool:
-    """Whether a drawbar force is in the log; True where the estimates do not say what is."""
-    return "drawbar_force" in tally.about.get("settings", {}).get("channels", ("drawbar_force",))
 
 
 def _names(tally: Tally, quantity: str, columns: Columns) -> list[str]:
@@ -166,7 +166,9 @@ def _consistency(tally: Tally) -> list[str]:
 def _assumed(tally: Tally) -> list[str]:
     """What the estimates rest on that the log does not show."""
     vehicle, assumptions = tally.about.get("vehicle", {}), []
-    other = ("drawbar_force",) if _has_cell(tally) else ("drawbar_gain", "drawbar_offset")
+    other = (
+        ("drawbar_force",) if measures(tally.about, "drawbar_force") else ("drawbar_gain", "drawbar_offset")
+    )
     given = {name: value for name, value in _uncertainty(tally).items() if value and name not in other}
     if given:
         assumptions.append(

@@ -119,9 +119,8 @@ def _missing(column: str, log: LogTable, *, several_for: str | None = None) -> I
         nearest(column, log.names) if "*" not in column else None
     )  # a pattern is near to what it was made to leave out
     hint = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
-    alike = [
-        name for name in log.names if f".{column}." in f".{name}."
-    ]  # of several messages, or pages of one
+    # of several messages, or pages of one
+    alike = [name for name in log.names if f".{column}." in f".{name}."]
     hint = how_to_pivot(log.names) or (f"the log has {', '.join(alike[:6])}" if len(alike) > 1 else hint)
     problem = "is missing, but the profile names it"
     if several_for is not None:

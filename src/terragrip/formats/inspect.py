@@ -133,9 +133,8 @@ def inspect(
     fits = Fit()
     try:
         recording = _recording(log, chosen)
-        warnings += [
-            note for note in recording.notes if note not in (*warnings, NOTHING_TOWED)
-        ]  # missing, below
+        said = (*warnings, NOTHING_TOWED)  # the latter among what is missing
+        warnings += [note for note in recording.notes if note not in said]
     except InputError as error:
         if profile is not None:
             raise

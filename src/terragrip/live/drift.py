@@ -15,7 +15,7 @@ BLOCK = 10.0  # s of arrivals that are judged together
 RATE = 2e-4  # s in a second: two crystals, 100 ppm each
 _FRESHEST = 3  # the least of so many counts, so that two wild stamps do not
 _LEAST = 1e-3  # s that are worth a correction
-_TOLD = 0.02  # s
+_REPORTED = 0.02  # s
 
 
 @dataclass(slots=True)
@@ -26,7 +26,7 @@ class Drift:
     start: float = 0.0  # arrival of the block's first sample
     leads: list[float] = field(default_factory=list)  # the block's greatest, ascending
     total: float = 0.0  # s corrected
-    told: float = _TOLD  # s of `total` that are next worth an event
+    reported: float = _REPORTED  # s of `total` that are next worth an event
 
     def correction(self, arrival: float, lead: float) -> float:
         """What stamps are to be corrected by from the next sample on [s]: 0 but at a block's end."""
@@ -62,7 +62,7 @@ class Drift:
 
     def is_news(self) -> bool:
         """Whether the drift has become worth an event: at 20 ms, and where it has doubled."""
-        if abs(self.total) < self.told:
+        if abs(self.total) < self.reported:
             return False
-        self.told = 2.0 * abs(self.total)
+        self.reported = 2.0 * abs(self.total)
         return True

@@ -198,9 +198,8 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
     if rows.sum() < _OFTEN or not _is_restless(time, values):
         return []
-    step = max(
-        quantum(what), quantum(what[first[rows]])
-    )  # a lag that was corrected leaves it in the kept values alone
+    # A lag that was corrected leaves the step in the kept values alone.
+    step = max(quantum(what), quantum(what[first[rows]]))
     if step >= _RESOLVED * (white_noise(when, what) or 0.0):
         return []
     k = int(np.argmax(rows))

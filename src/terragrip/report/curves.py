@@ -138,7 +138,7 @@ def draw_both_maxima(curve: SoilCurves, tire_resistance: float) -> str:
             (peaks.efficiency, "η", GREEN, "s"),
         ):
             if np.isfinite(at):
-                plot.plot([at], [height], marker, color=color, markersize=7)
+                _draw_maximum(plot, at, height, curve.reach, marker, color, 7)
                 sentence = f"largest {what}: {height:.2f} at {100 * at:.0f} % slip"
                 sentence += ", beyond the data" * (at > curve.reach)
                 plot.annotate(
@@ -167,8 +167,7 @@ def draw_all_maxima(curves: Sequence[SoilCurves], tire_resistance: float) -> str
             eta = _efficiency(soil, slip, tire_resistance)
             _draw_line(right, slip, eta, curve.reach, {**style, "label": None})
             for plot, (at, height), marker in ((left, peaks.adhesion, "o"), (right, peaks.efficiency, "s")):
-                fill = "none" if at > curve.reach else "full"
-                plot.plot([at], [height], marker, color=color, markersize=5, fillstyle=fill)
+                _draw_maximum(plot, at, height, curve.reach, marker, color, 5)
         for plot, label in ((left, "adhesion µ [–]"), (right, "tractive efficiency η [–]")):
             name_axis(plot.xaxis, "slip s [%]")
             plot.set_ylabel(label)
@@ -223,8 +222,17 @@ def _draw_line(plot: Axes, slip: Floats, values: Floats, reach: float, style: di
     within = slip <= reach
     beyond = slip >= slip[within].max(initial=0.0)
     (line,) = plot.plot(slip[within], values[within], **style)
-    plot.plot(slip[beyond], values[beyond], **{**style, "linestyle": ":", "alpha": 0.6, "label": None})
+    if not within.all():
+        plot.plot(slip[beyond], values[beyond], **{**style, "linestyle": ":", "alpha": 0.6, "label": None})
     return line
+
+
+def _draw_maximum(
+    plot: Axes, at: float, height: float, reach: float, marker: str, color: str, size: int
+) -> None:
+    """A maximum of a curve, hollow beyond the data."""
+    fill = "none" if at > reach else "full"
+    plot.plot([at], [height], marker, color=color, markersize=size, fillstyle=fill)
 
 
 def _line(curve: SoilCurves) -> dict[str, Any]:

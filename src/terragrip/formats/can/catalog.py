@@ -142,10 +142,10 @@ def message_of(database: Any, message: Any) -> Message:
     extended = EXTENDED if message.is_extended_frame else 0
     key = group_of(message.frame_id) if by_group else message.frame_id | extended
     fields = [_field(signal, codes=by_group) for signal in message.signals]
-    return Message(message.name, key, _told_apart(fields), message.length, by_group)
+    return Message(message.name, key, _distinct(fields), message.length, by_group)
 
 
-def _told_apart(fields: Sequence[Field]) -> tuple[Field, ...]:
+def _distinct(fields: Sequence[Field]) -> tuple[Field, ...]:
     """Fields that share a name, as a multiplexer's pages do, get that of the page (``Speed.m1``), or of their place (``Speed.bit16``)."""
     names = Counter(field.name for field in fields)
     pages = Counter((field.name, page) for field in fields for page in field.chosen)
