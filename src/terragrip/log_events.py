@@ -10,7 +10,7 @@ LIVE = (
     "schema", "behind", "refused", "resumed", "sink_lost", "sink_back", "record_failed", "ground_change", "learned", "units",
     "contradiction", "immobilization", "stuck", "push",
 )  # fmt: skip
-"""Of the live service; sinks get these too (terragrip.live.event)."""
+"""Of the live service; sinks get these too (terragrip.live.outputs)."""
 EVENTS = (
     *LIVE, "live_started", "live_stopped", "studio_started", "studio_stopped", "studio_write", "job_started", "job_ended",
     "fleet_started", "fleet_log_failed", "fleet_ended", "vehicle_started", "vehicle_refused", "vehicle_failed",

@@ -63,7 +63,7 @@ async def test_estimates_as_frames_that_the_dbc_describes(tmp_path, vehicle, sho
 
 def test_what_is_missing_is_not_available(vehicle):
     from terragrip.estimation.estimator import Estimate, TractionEstimator
-    from terragrip.live.core import Row
+    from terragrip.live.outputs import Row
     from terragrip.live.sinks.can import CanSink
     from terragrip.live.uri import Uri
 

@@ -21,8 +21,9 @@ from terragrip.estimation.engine_estimator import EngineEstimator, live_estimato
 from terragrip.estimation.estimates import Estimates
 from terragrip.formats import Profile
 from terragrip.live import read_record
-from terragrip.live.core import Core, Row, Settings
+from terragrip.live.core import Core, Settings
 from terragrip.live.options import Options
+from terragrip.live.outputs import Row
 from terragrip.live.service import Service
 from terragrip.simulation.families import Kind, draw
 

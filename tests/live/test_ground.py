@@ -12,8 +12,9 @@ from machine import events, rows_of
 from terragrip.estimation import TractionEstimator
 from terragrip.ground.live import LiveGround
 from terragrip.live import read_record
-from terragrip.live.core import Core, Ground, Settings
+from terragrip.live.core import Core, Settings
 from terragrip.live.options import Options
+from terragrip.live.outputs import Ground
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary

@@ -13,8 +13,8 @@ from machine import rows_of
 from terragrip.estimation import learning
 from terragrip.estimation.learning import SettingsLearner
 from terragrip.live import read_record
-from terragrip.live.core import Core, Row, Settings
-from terragrip.live.event import Event
+from terragrip.live.core import Core, Settings
+from terragrip.live.outputs import Event, Row
 from terragrip.live.pipeline import Pipeline
 
 UNKNOWN = {"drawbar_force": 4.0, "pitch": 0.002}  # all else the log must tell

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terragrip.estimation.estimator import Estimate
-from terragrip.live.core import Row
 from terragrip.live.message import Columns
+from terragrip.live.outputs import Row
 
 
 def row(values: dict[str, float], time: float = 1.5, predicted: bool = False) -> Row:

@@ -12,7 +12,7 @@ from machine import rows_of
 from terragrip.live.clock import Pace, SourceClock
 from terragrip.live.core import Core, Settings
 from terragrip.live.counts import Counts
-from terragrip.live.event import Event
+from terragrip.live.outputs import Event
 from terragrip.live.reorder import Reorder
 
 STEP = 0.01

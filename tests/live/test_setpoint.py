@@ -15,10 +15,10 @@ from terragrip.advice.setpoint import SlipSetpoint
 from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
-from terragrip.live.core import Row
 from terragrip.live.message import ESTIMATE, SETPOINT, Message
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
+from terragrip.live.outputs import Row
 from terragrip.live.service import Service
 from terragrip.live.setpoint import FREED, LiveSetpoint
 from terragrip.live.uri import Uri

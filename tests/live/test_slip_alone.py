@@ -13,7 +13,8 @@ import terragrip as tg
 from terragrip import TractionEstimator
 from terragrip.cli import main
 from terragrip.errors import InputError
-from terragrip.live.core import Core, Row, Settings
+from terragrip.live.core import Core, Settings
+from terragrip.live.outputs import Row
 from terragrip.live.service import Service
 from terragrip.live.sinks.can import CanSink
 from terragrip.live.uri import Uri

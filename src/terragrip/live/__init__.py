@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from terragrip.live.core import Core, Row
-from terragrip.live.event import Event
+from terragrip.live.core import Core
+from terragrip.live.outputs import Event, Row
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.record_folder import read_record
 

@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from terragrip.live.drift import Drift
+from terragrip.live.outputs import Values
 
 AHEAD = 1.0  # s
 JUMP = 10.0  # s
@@ -24,7 +25,6 @@ LATE = 2.0  # s of arrivals, all behind rows already released, after which that 
 _WAITING = 5000
 _MARKS, _APART, _TOO_FAST = 4, 0.5, 50.0  # of `Pace`: marks, s between them, s a second
 
-Values = dict[str, float]
 Stamped = tuple[float, float, Values]  # arrival, time (or stamp while waiting), values
 
 

@@ -22,11 +22,11 @@ from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.rims import DRIVE, speeds_alone
 from terragrip.live.clock import Pace, SourceClock, Stamped
 from terragrip.live.counts import Counts
-from terragrip.live.event import Event
+from terragrip.live.outputs import Event, Output, Refusal, Row, Values, of_ground
 from terragrip.live.reorder import Pending, Reorder
 
 if TYPE_CHECKING:
-    from terragrip.ground.live import GroundState, LiveGround
+    from terragrip.ground.live import LiveGround
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
@@ -38,8 +38,6 @@ _WARNINGS = {
     "push": "the tool pushes",
 }
 """Events of the estimator that concern a driver, in words."""
-
-Values = dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,50 +69,6 @@ class Settings:
     def from_dict(cls, data: Mapping[str, Any]) -> Settings:
         """The inverse of `to_dict`."""
         return cls(**{**data, "sources": tuple(data["sources"]), "channels": tuple(data["channels"])})
-
-
-@dataclass(slots=True)
-class Row:
-    """A row that went into the estimator, and its estimate; ``arrival`` [s] of its first sample."""
-
-    arrival: float
-    values: Values
-    estimate: Estimate
-    predicted: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """A sample, or part of one, that did not get to the estimator."""
-
-    arrival: float
-    time: float
-    source: int
-    why: str
-    values: Values
-
-
-@dataclass(frozen=True, slots=True)
-class Ground:
-    """The ground at the end of half a second: the most probable soil, the probability of each, and a change reported now."""
-
-    time: float
-    soil: str
-    probabilities: Mapping[str, float]
-    change: Mapping[str, float] | None  # time, std, probability
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        return {
-            "time": self.time,
-            "soil": self.soil,
-            "probability": self.probabilities[self.soil],
-            "probabilities": dict(self.probabilities),
-            "change": None if self.change is None else dict(self.change),
-        }
-
-
-Output = Row | Event | Refusal | Ground
 
 
 class Core:
@@ -236,7 +190,7 @@ class Core:
             self.counts.add(note["fate"], note["channels"], note["number"])
             if note["fate"] == "dropped" and note["source"] is not None:
                 self.clocks[note["source"]].dropped(note["arrival"])
-        return [Event.from_dict({**note["event"], "time": self.time})] if "event" in note else []
+        return [Event(**{**note["event"], "time": self.time})] if "event" in note else []
 
     def _release(self, rows: list[Pending], out: list[Output]) -> list[Output]:
         for row in rows:
@@ -259,7 +213,7 @@ class Core:
             if self.ground is not None:
                 state = self.ground.update(estimate)
                 if state is not None:
-                    out += _ground_outputs(state)
+                    out += of_ground(state)
             if self.learner is not None:
                 self._learn(estimator, self.learner, row, out)
         if self.reorder.changes:
@@ -390,18 +344,3 @@ class Core:
 
             result.ground = LiveGround.restore(base64.b64decode(state["ground"]), result.estimator, library)
         return result
-
-
-def _ground_outputs(state: GroundState) -> list[Output]:
-    """A block's state as outputs of ours; with an event where the ground changes."""
-    change = state.change
-    as_numbers = (
-        None
-        if change is None
-        else {"time": change.time, "std": change.std, "probability": change.probability}
-    )
-    out: list[Output] = [Ground(state.time, state.soil, state.probabilities, as_numbers)]
-    if change is not None:
-        text = f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
-        out.append(Event(state.time, "ground_change", "ground", text))
-    return out

@@ -11,13 +11,13 @@ from terragrip.errors import InputError
 from terragrip.estimation.rims import speeds_alone
 from terragrip.formats.profile import Profile
 from terragrip.formats.profile_parts import Source, matching
+from terragrip.live.outputs import Values
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
-Values = dict[str, float]
 Sample = tuple[float | None, Values]
 """Stamp [s] on the source's clock, None where the message has none; and values."""
 

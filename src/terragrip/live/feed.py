@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from terragrip.live.decode import Decoder
-from terragrip.live.inbox import Inbox, Values
+from terragrip.live.inbox import Inbox
+from terragrip.live.outputs import Values
 from terragrip.live.payload import Unpack, Unreadable
 
 _EVERY = 5.0  # s between two events of the same kind about the same thing

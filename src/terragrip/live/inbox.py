@@ -11,8 +11,9 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from terragrip.live.outputs import Values
+
 CAPACITY = 8192  # samples
-Values = dict[str, float]
 Arrived = tuple[float, int, float, Values]
 """Arrival [s], source, stamp [s], values."""
 
@@ -57,7 +58,7 @@ class Inbox:
         self._filled.set()
 
     def event(self, kind: str, source: str, text: str) -> None:
-        """Add an event (`terragrip.live.event.KINDS`) of a source or sink."""
+        """Add an event (`terragrip.log_events.LIVE`) of a source or sink."""
         sound = text.encode("utf-8", "backslashreplace").decode()  # half a surrogate pair is no text to most
         self._events.append({"event": {"time": None, "kind": kind, "source": source, "text": sound}})
         self._filled.set()

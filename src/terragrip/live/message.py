@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
 
-from terragrip.live.core import Row
-from terragrip.live.event import Event
+from terragrip.live.outputs import Event, Row
 
 ESTIMATE, EVENT, STATUS, SOIL, GROUND, SETPOINT = "estimate", "event", "status", "soil", "ground", "setpoint"
 

@@ -8,8 +8,8 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from terragrip.live.core import Core, Output, Values
-from terragrip.live.event import Event
+from terragrip.live.core import Core
+from terragrip.live.outputs import Event, Output, Values
 from terragrip.live.record import ROWS, SECONDS, Recorder
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from terragrip.estimation.engine_estimator import restored
 from terragrip.estimation.estimator import TractionEstimator
-from terragrip.live.core import Core, Row
+from terragrip.live.core import Core
+from terragrip.live.outputs import Row
 
 _PATIENCE = 0.3  # s of silence, or
 _PERIODS = 5.0  # rows' periods

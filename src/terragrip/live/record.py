@@ -17,7 +17,8 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.files import unwritable
-from terragrip.live.core import Core, Output
+from terragrip.live.core import Core
+from terragrip.live.outputs import Output
 from terragrip.live.record_folder import (
     SOILS,
     clear,

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from terragrip.live.counts import Counts
+from terragrip.live.outputs import Values
 
 LOST = 5  # periods
 _STEPS = 15  # of which the median is the period
@@ -22,8 +23,6 @@ _LEARNING = 2.0  # s after which a stream without a period counts as irregular
 _RECENT = 512  # rows remembered to tell a doubled sample from a late one
 _LAYOUTS = 256  # sets of channels whose streams are kept
 _BEGINNING = float("-inf")
-
-Values = dict[str, float]
 
 
 @dataclass(slots=True)

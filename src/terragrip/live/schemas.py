@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from terragrip.live.event import KINDS
 from terragrip.live.message import ESTIMATE, EVENT, GROUND, SETPOINT, SOIL, STATUS
+from terragrip.log_events import LIVE
 
 _NUMBER = {"type": ["number", "null"]}
 _TEXT = {"type": "string"}
@@ -55,7 +55,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
             "additionalProperties": {"type": "number"},
         },
     },
-    EVENT: {"time": _TIME, "kind": {"type": "string", "enum": list(KINDS)}, "source": _TEXT, "text": _TEXT},
+    EVENT: {"time": _TIME, "kind": {"type": "string", "enum": list(LIVE)}, "source": _TEXT, "text": _TEXT},
     STATUS: {
         "time": _TIME,
         "rows": _COUNT,

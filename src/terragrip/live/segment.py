@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.files import sync
-from terragrip.live.core import Ground, Output, Refusal, Row
-from terragrip.live.event import Event
+from terragrip.live.outputs import Event, Ground, Output, Refusal, Row
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from terragrip.advice.setpoint import STOP, SlipSetpoint
-from terragrip.live.core import Row
+from terragrip.live.outputs import Row
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle

@@ -6,11 +6,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
-from terragrip.live.core import Core, Ground, Row
-from terragrip.live.event import Event
+from terragrip.live.core import Core
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
+from terragrip.live.outputs import Event, Ground, Row
 from terragrip.live.pulse import Pulse
 from terragrip.recording.clock import clock_text
 from terragrip.recording.columns import SINCE_1970

@@ -11,8 +11,8 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.columns import wheels_with
-from terragrip.live.core import Row
 from terragrip.live.message import EVENT, Message
+from terragrip.live.outputs import Row
 
 if TYPE_CHECKING:
     from terragrip.live.service import Service

@@ -8,14 +8,14 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terragrip.live.core import Core, Ground, Output, Row
+from terragrip.live.core import Core
 from terragrip.live.decode import Decoder
-from terragrip.live.event import Event
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
 from terragrip.live.options import has_slips
 from terragrip.live.outbox import Outbox
+from terragrip.live.outputs import Event, Ground, Output, Row
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.prediction import Prediction

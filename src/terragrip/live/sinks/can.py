@@ -13,9 +13,9 @@ from terragrip.estimation.estimator import Estimate
 from terragrip.estimation.rims import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
 from terragrip.live.can_bus import bus_of, check
-from terragrip.live.core import Row
 from terragrip.live.message import GROUND, SOIL, Message
 from terragrip.live.outbox import Outbox
+from terragrip.live.outputs import Row
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
