@@ -338,7 +338,7 @@ def test_a_full_disk_is_no_success(place: Path, ran: Ran, monkeypatch: pytest.Mo
     monkeypatch.setattr("terragrip.fleet.run.run_fleet", lambda *_, **__: done)
     code, _, errors = ran()
     assert (code, errors.count("\n")) == (2, 1)
-    assert "no space was left on the disk for 1 of 6 logs" in errors
+    assert "the disk had no room for 1 of 6 logs" in errors
 
 
 def test_that_logs_have_notes_is_said(place: Path, ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -352,6 +352,7 @@ def test_that_logs_have_notes_is_said(place: Path, ran: Ran, monkeypatch: pytest
     [
         (OSError(errno.ENOSPC, "auf dem Gerät ist kein Platz mehr"), True),
         (OSError(errno.EDQUOT, "quota"), True),
+        (OSError(errno.EFBIG, "larger than a file may be"), True),
         (OSError("Error writing bytes to file. Detail: [errno 28] whatever"), True),
         (OSError(errno.EACCES, os.strerror(errno.ENOSPC)), False),
         (InputError(f"holds the text {os.strerror(errno.ENOSPC)}"), False),
@@ -370,6 +371,31 @@ def test_a_full_disk_is_known_by_its_number_and_not_by_a_text(error: Exception, 
         outcome = _attempt(log, step)
         assert isinstance(outcome, Outcome)
         assert outcome.disk_full is full
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.ESTALE])
+def test_a_disk_or_network_that_is_lost_takes_no_earlier_estimates(
+    place: Path, estimated: Path, ran: Ran, number: int
+) -> None:
+    """The machine's fault says nothing of a log: neither of one estimated anew (--smooth), nor of one as before."""
+
+    def fails(*_: object) -> None:
+        raise InputError("cannot be written", file="0.parquet") from OSError(number, os.strerror(number))
+
+    logs = fleet_logs(
+        on_disk(logs_in([place / "logs/**/*.csv"]), str(place / "out")), place / "Heros.yaml", None, None
+    )
+    store = Store.at(str(estimated))
+    before, failed = known_notes(store)
+    notes, reasons = settled(
+        store,
+        before,
+        failed,
+        [outcome for log in logs if isinstance(outcome := _attempt(log, fails), Outcome)],
+    )
+    assert len(notes) == len(reasons) == 6
+    assert reasons["drive0.csv"].endswith("; its estimates of an earlier call are kept")
+    assert "0 estimated, 6 unchanged, 0 failed" in ran()[1]
 
 
 def test_a_result_that_is_lost_with_the_last_worker_does_not_stop_the_call() -> None:
@@ -579,8 +605,8 @@ def test_a_log_with_estimates_is_no_failure(place: Path, estimated: Path, ran: R
 def test_a_log_whose_worker_was_lost_keeps_its_earlier_estimates(estimated: Path, ran: Ran) -> None:
     store = Store.at(str(estimated))
     before, failed = known_notes(store)
-    lost = Outcome("drive0.csv", reason="no worker came back", worker_lost=True)
-    broken = Outcome("drive1.csv", reason="is no log")
+    lost = Outcome("drive0.csv", reason="no worker came back")
+    broken = Outcome("drive1.csv", reason="is no log", refused=True)
     notes, reasons = settled(store, before, failed, [lost, broken])
     assert {note["log"] for note in notes} == {f"drive{k}.csv" for k in (0, 2, 3, 4, 5)}
     assert reasons["drive0.csv"] == "no worker came back; its estimates of an earlier call are kept"

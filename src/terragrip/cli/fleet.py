@@ -139,7 +139,7 @@ def command(
         _write_metrics(metrics, done, time.monotonic() - began)
     if done.unwritten:
         raise InputError(
-            f"no space was left on the disk for {done.unwritten} of {len(logs)} logs",
+            f"the disk had no room for {done.unwritten} of {len(logs)} logs",
             file=output,
             place="--output",
             hint="free space and run again; finished logs are kept",

@@ -254,14 +254,14 @@ class Pool:
                 yield from self._all([suspects[:1]], settings, store, alone)
                 name = suspects.pop(0).name
                 if alone:
-                    yield _lost(name, f"its worker was lost twice while estimating it alone: {_MEMORY}")
+                    reason = f"its worker was lost twice while estimating it alone: {_MEMORY}"
+                    yield Outcome(name, reason=reason)
         except _NoWorkersError as error:
             names = sorted({log.name for log in (*suspects, *error.logs)})
             others = f" or one of {len(names) - 1} others" if len(names) > 1 else ""
             for name in names:
-                yield _lost(
-                    name, f"no worker came back after the last was lost, with this log{others}: {_MEMORY}"
-                )
+                reason = f"no worker came back after the last was lost, with this log{others}: {_MEMORY}"
+                yield Outcome(name, reason=reason)
             raise self._without_workers(names) from None
 
     def _all(
@@ -364,11 +364,7 @@ def _outcomes_of(future: Any, batch: list[FleetLog], suspects: list[FleetLog]) -
         suspects += batch
         return []
     reason = " ".join(f"the worker could not run it ({type(error).__name__}: {error})".split())
-    return [_lost(log.name, reason) for log in batch]
-
-
-def _lost(name: str, reason: str) -> Outcome:
-    return Outcome(name, reason=reason, worker_lost=True)
+    return [Outcome(log.name, reason=reason) for log in batch]
 
 
 def default_workers() -> int:

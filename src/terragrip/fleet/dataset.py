@@ -1,4 +1,4 @@
-"""A fleet's tables: which logs are in the data set and which failed; in both is one whose worker was lost."""
+"""A fleet's tables: which logs are in the data set and which failed; in both is one that is still in it from an earlier call."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def settled(
     """The notes and failures after a call; files that are no longer referenced are removed.
 
     Logs of earlier calls that this one did not name are kept. If a log was estimated differently or failed now, its old estimates are
-    removed; not so if its worker was lost, which says nothing of the log.
+    removed; not so if it failed by something else than itself (`Outcome`).
     """
     notes, reasons = dict(before), dict(failed)
     for one in outcomes:
@@ -94,7 +94,7 @@ def settled(
             notes[one.log] = one.note
         else:
             reasons[one.log] = one.reason or "unknown"
-            if one.worker_lost and old is not None and is_whole(old, store):
+            if not one.refused and old is not None and is_whole(old, store):
                 notes[one.log] = old
                 reasons[one.log] += "; its estimates of an earlier call are kept"
                 continue

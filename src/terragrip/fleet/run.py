@@ -125,7 +125,7 @@ def run_fleet(
     result = FleetResult(
         estimated=sum(one.fresh for one in outcomes),
         unchanged=sum(one.note is not None and not one.fresh for one in outcomes),
-        failed={one.log: one.reason or "" for one in outcomes if one.note is None},
+        failed={one.log: reasons[one.log] for one in outcomes if one.note is None},
         unwritten=sum(one.disk_full for one in outcomes),
         kept=sum(note["log"] not in named for note in notes),
         noted=sum(note["log"] in named and bool(note["summary"]["notes"]) for note in notes),

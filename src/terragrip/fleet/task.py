@@ -46,8 +46,8 @@ class Settings:
 @dataclass(frozen=True)
 class Outcome:
     """The result of a log: its ``note`` (`make_note`), or the ``reason`` why it failed. ``disk_full``: its estimates did not fit on the
-    disk. ``fresh``: this call estimated it, in ``seconds`` including reading and writing. ``worker_lost``: it failed with its worker, so
-    nothing is known of the log.
+    disk. ``fresh``: this call estimated it, in ``seconds`` including reading and writing. ``refused``: the log itself was; where it failed
+    by a worker, memory, disk or network that was lost, nothing is known of it.
     """
 
     log: str
@@ -56,7 +56,7 @@ class Outcome:
     fresh: bool = False
     seconds: float = 0.0
     disk_full: bool = False
-    worker_lost: bool = False
+    refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,10 @@ def _attempt(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result 
     try:
         return step(*given)
     except Exception as error:  # noqa: BLE001 - whatever it is, only this log fails
-        full = system_error(error) in (errno.ENOSPC, errno.EDQUOT)
-        return Outcome(log.name, reason=_in_one_line(_reason(error)), disk_full=full)
+        number = system_error(error)
+        full = number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        refused = isinstance(error, InputError) and number is None
+        return Outcome(log.name, reason=_in_one_line(_reason(error)), disk_full=full, refused=refused)
 
 
 def _reason(error: Exception) -> str:
