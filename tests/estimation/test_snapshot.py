@@ -7,6 +7,9 @@ import pytest
 from drives import drive, robot
 from terragrip.errors import InputError
 from terragrip.estimation import METHODS, TractionEstimator
+from terragrip.estimation.engine_estimator import _MAGIC, restored
+from terragrip.estimation.estimator import _SNAPSHOT_MAGIC
+from terragrip.estimation.sealed import seal
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +59,10 @@ def test_a_short_snapshot_is_refused(size):
     data = TractionEstimator(robot()).snapshot()
     with pytest.raises(InputError, match="snapshot is damaged"):
         TractionEstimator.restore(data[:size])
+
+
+@pytest.mark.parametrize("mark", [_SNAPSHOT_MAGIC, _MAGIC])
+@pytest.mark.parametrize("body", [b"ab", b"\2\0\0\0no", b"\2\0\0\0{}", b"\2\0\0\0[]", b"[]", b'{"inner": 1}'])
+def test_bytes_with_a_right_checksum_and_another_content_are_refused(mark, body):
+    with pytest.raises(InputError, match="snapshot is damaged"):
+        restored(seal(mark, body))

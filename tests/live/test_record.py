@@ -209,3 +209,13 @@ def test_a_snapshot_of_another_version_is_refused_in_one_line(tmp_path, vehicle,
 def test_no_record_is_said(tmp_path):
     with pytest.raises(InputError, match="holds no record"):
         read_record(tmp_path)
+
+
+@pytest.mark.parametrize("content", [("S", [0.0, 7, 0.0, {}]), ("S", 3), ("N", {"event": {"why": "x"}})])
+def test_a_write_ahead_file_of_something_else_is_refused_in_one_line(tmp_path, vehicle, short, content):
+    pipeline = Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)
+    pipeline.recorder._ahead.add(*content)
+    pipeline.write()
+    pipeline.recorder.abandon()
+    with pytest.raises(InputError, match="holds an input that is none, before byte"):
+        Pipeline(Core(vehicle, settings_for(short.recording)), tmp_path)

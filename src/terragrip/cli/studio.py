@@ -53,14 +53,10 @@ def command(
 
     The token for other machines is new at each start, or that of the environment variable TERRAGRIP_TOKEN. Ctrl-C ends the studio.
     """
-    import ipaddress
+    from terragrip.live.uri import is_address, is_loopback
 
-    try:
-        home = ipaddress.ip_address("127.0.0.1" if address == "localhost" else address).is_loopback
-    except ValueError:
-        raise InputError(
-            f"{address!r} is not an IP address", place="--address", hint="give e.g. 0.0.0.0"
-        ) from None
+    if not (home := is_loopback(address)) and not is_address(address):
+        raise InputError(f"{address!r} is not an IP address", place="--address", hint="give e.g. 0.0.0.0")
     if live is not None and not live.startswith(("ws://", "wss://")):
         raise InputError(f"{live!r} is not a WebSocket address", place="--live", hint="give ws://HOST:PORT")
     if public_url is not None and not _is_web_address(public_url):

@@ -14,11 +14,10 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.driveline import DrivenMachine, by_engine
-from terragrip.estimation.engine import refusal
 from terragrip.estimation.engine_torque import SHARE_STD, TAIL
 from terragrip.estimation.estimator import Estimate, TractionEstimator, unusable
 from terragrip.estimation.methods import DEFAULT
-from terragrip.estimation.sealed import seal, unseal
+from terragrip.estimation.sealed import seal, understood, unseal
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -139,6 +138,7 @@ class EngineEstimator(TractionEstimator):
         return seal(_MAGIC, json.dumps(about).encode())
 
     @classmethod
+    @understood()
     def restore(cls, data: bytes) -> Self:
         """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
         from terragrip.vehicle import Vehicle
@@ -151,10 +151,7 @@ class EngineEstimator(TractionEstimator):
             machine, about["given"], inner.method, sensors=inner.noise, held=inner.held, fixed=about["fixed"]
         )
         result.guessed, result._engine = inner.guessed, inner._engine
-        tail = np.frombuffer(b64decode(about["tail"]))
-        if tail.size % len(result._recent):
-            raise refusal(6, None)
-        result._recent = tail.reshape(len(result._recent), -1)
+        result._recent = np.frombuffer(b64decode(about["tail"])).reshape(len(result._recent), -1)
         return result
 
 

@@ -15,7 +15,7 @@ from terragrip.estimation.engine import EVENTS, Engine, estimate_slots, refusal
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
 from terragrip.estimation.noise import DELAY, channel_noise, settings_in
 from terragrip.estimation.rims import Rim, rims_of, speeds_alone
-from terragrip.estimation.sealed import seal, unseal
+from terragrip.estimation.sealed import seal, understood, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
 from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.schema import is_own, split_channel
@@ -302,11 +302,10 @@ class TractionEstimator:
         return seal(_SNAPSHOT_MAGIC, body)
 
     @classmethod
+    @understood()
     def restore(cls, data: bytes) -> Self:
         """The estimator of a snapshot; raises InputError if the bytes are damaged or of another version."""
         body = unseal(_SNAPSHOT_MAGIC, data)
-        if len(body) < 4:
-            raise refusal(6, None)
         length = struct.unpack("<I", body[:4])[0]
         about = json.loads(body[4 : 4 + length])
         restored = cls(

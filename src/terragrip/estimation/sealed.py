@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from terragrip.estimation.engine import refusal
 
@@ -24,3 +26,12 @@ def unseal(mark: bytes, data: bytes) -> bytes:
     ):
         raise refusal(6, None)
     return body
+
+
+@contextmanager
+def understood() -> Iterator[None]:
+    """Raise InputError where a sound body does not hold what a snapshot of ours does."""
+    try:
+        yield
+    except (ValueError, LookupError, TypeError, AttributeError, struct.error):
+        raise refusal(6, None) from None

@@ -12,7 +12,7 @@ from typing import Any, Self
 from terragrip.errors import InputError
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Uri, is_loopback
 
 _PATIENCE = 5.0  # s for the broker to answer, and to take what is left at the end
 _AT_ONCE = 64  # messages read before others have their turn
@@ -36,7 +36,7 @@ def check(uri: Uri, wild: bool = False) -> Credentials:
     credentials = Credentials.find()
     if uri.scheme == "mqtts":
         _tls(uri)
-    elif credentials.password and not uri.is_loopback():
+    elif credentials.password and not is_loopback(uri.host):
         raise InputError("the password would be sent unencrypted", place=uri.text, hint="use mqtts:")
     return credentials
 

@@ -65,8 +65,14 @@ def replay(folder: Path, number: int, core: Core) -> Iterator[tuple[Segment, Rea
     while wal_path(folder, number).exists():
         reading, segment = Reading(wal_path(folder, number)), Segment(number)
         for kind, content in reading:
-            for output in core.handle(kind, content):
-                segment.add(output)
+            try:
+                for output in core.handle(kind, content):
+                    segment.add(output)
+            except (ValueError, LookupError, TypeError, AttributeError) as error:
+                raise InputError(
+                    f"holds an input that is none, before byte {reading.good}", file=wal_path(folder, number),
+                    hint="begin a new record in another folder",
+                ) from error  # fmt: skip
         number += 1
         yield segment, reading, wal_path(folder, number).exists()
 

@@ -12,6 +12,20 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 from terragrip.errors import InputError, missing_package, suggestion
 
 
+def is_address(host: str) -> bool:
+    """Whether a host is an IP address."""
+    try:
+        ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host can be reached from this machine only; a name, even 127.0.0.1.example.org, is whatever its owner says."""
+    return host == "localhost" or (is_address(host) and ip_address(host).is_loopback)
+
+
 @dataclass(frozen=True, slots=True)
 class Uri:
     """A URI taken apart. ``text`` is what the user wrote; ``path`` what follows ``scheme:`` or the host."""
@@ -86,15 +100,6 @@ class Uri:
             hint = f"give {', '.join(known[:-1])} or {known[-1]}"
             raise InputError(f"{option} is {text!r}", place=self.text, hint=hint)
         return text
-
-    def is_loopback(self) -> bool:
-        """Whether the host can be reached from this machine only."""
-        if self.host == "localhost":
-            return True
-        try:
-            return ip_address(self.host).is_loopback
-        except ValueError:
-            return False  # a name, even 127.0.0.1.example.org, is whatever its owner says
 
 
 Links = dict[str, tuple[str, Collection[str]]]

@@ -10,7 +10,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Lost
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Uri, is_loopback
 
 
 @asynccontextmanager
@@ -39,7 +39,7 @@ def config(uri: Uri) -> Any:
     ends = {name: [e for e in uri.options.get(name, "").split(",") if e] for name in ("connect", "listen")}
     for end in ends["listen"]:
         host = end.partition("/")[2].rpartition(":")[0].strip("[]")
-        if not Uri(end, "", host=host).is_loopback():
+        if not is_loopback(host):
             raise InputError(
                 f"anyone could connect to {end}",
                 place=uri.text,

@@ -7,18 +7,17 @@ same-origin rule holds back). So every request is checked here, before any route
 from __future__ import annotations
 
 import hmac
-import ipaddress
 import logging
 from collections.abc import Iterable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, quote, urlsplit
 
+from terragrip.live.uri import is_address, is_loopback
 from terragrip.log_events import emit
 
 COOKIE = "terragrip_token"
 _READING = ("GET", "HEAD", "OPTIONS")
-LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
     "font-src 'self'; worker-src 'self'; manifest-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'self'"
@@ -49,7 +48,7 @@ class Access:
         self, app: Any, hosts: Iterable[str] = (), token: str | None = None, public: str | None = None
     ) -> None:
         self._app, self._token = app, token
-        self._hosts = LOOPBACK | {host.lower() for host in hosts}
+        self._hosts = {host.lower() for host in hosts}
         place = urlsplit(public or "")
         self._public = place.netloc.lower()
         self._path = f"{place.path.rstrip('/')}/"
@@ -100,11 +99,11 @@ class Access:
 
     def _host_is_ours(self, header: str) -> bool:
         name = (urlsplit(f"//{header}").hostname or "").lower()
-        if name in self._hosts or header.lower() == self._public != "":
+        if is_loopback(name) or name in self._hosts or header.lower() == self._public != "":
             return True
         # With a token a rebound name gains nothing: it cannot bring the cookie of another name. So a tablet may name the machine
         # by its address, and by a name that only its own network gives out (RFC 6762, mDNS).
-        return self._token is not None and (_is_address(name) or name.endswith(".local"))
+        return self._token is not None and (is_address(name) or name.endswith(".local"))
 
     def _has_token(self, headers: dict[str, str]) -> bool:
         assert self._token is not None
@@ -143,14 +142,6 @@ def _audit(scope: Any, status: int) -> None:
 
 def _same(given: str, token: str) -> bool:
     return hmac.compare_digest(given.encode(), token.encode())
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
 
 
 async def _refuse(scope: Any, send: Any, status: int, text: str) -> None:

@@ -12,7 +12,7 @@ from terragrip.live.feed import Lost
 from terragrip.live.message import EVENT, STATUS, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.schemas import NAMES, schema_of
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Uri, is_loopback
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,7 @@ class FoxgloveSink:
         import foxglove
 
         self.uri, self._vehicle = uri, vehicle
-        if not uri.is_loopback():
+        if not is_loopback(uri.host):
             raise InputError(
                 "Foxglove's protocol has no password", place=uri.text,
                 hint="serve on 127.0.0.1, and connect by an SSH tunnel",

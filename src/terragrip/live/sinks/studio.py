@@ -13,7 +13,7 @@ from terragrip.live.broadcast import Broadcast
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
 from terragrip.live.outbox import Outbox
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Uri, is_loopback
 from terragrip.prometheus_text import CONTENT_TYPE
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class StudioSink:
         self.broadcast: Stream = Broadcast(vehicle.name if vehicle else "", columns)
         self.monitor: Answers | None = None
         self._credentials = Credentials.find()
-        if not uri.is_loopback() and not self._credentials.token:
+        if not is_loopback(uri.host) and not self._credentials.token:
             raise InputError(
                 "anyone could listen here", place=uri.text, hint="serve on 127.0.0.1, or set TERRAGRIP_TOKEN"
             )
@@ -132,6 +132,6 @@ class StudioSink:
 def _is_here(url: str) -> bool:
     """Whether a URL leads to this machine, by its text alone."""
     try:
-        return Uri("", "", host=urlsplit(url).hostname or "").is_loopback()
+        return is_loopback(urlsplit(url).hostname or "")
     except ValueError:
         return False

@@ -6,11 +6,10 @@ import asyncio
 import socket
 import struct
 import sys
-from ipaddress import ip_address
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Feed, Lost
-from terragrip.live.uri import Uri
+from terragrip.live.uri import Uri, is_address, is_loopback
 
 _BUFFER = 4 << 20  # bytes asked for, so that a burst finds room
 _LONGEST = 1 << 16  # bytes of a datagram
@@ -26,17 +25,12 @@ class UdpSource:
     def __init__(self, uri: Uri, *_: object) -> None:
         self.uri = uri
         self.allowed = frozenset(filter(None, uri.options.get("allow", "").split(",")))
-        for one in self.allowed:
-            try:
-                ip_address(one)
-            except ValueError:
-                hint = "name each sender by its address: ?allow=192.168.1.7,192.168.1.8"
-                raise InputError(
-                    f"allow has {one!r}, which is no IP address", place=uri.text, hint=hint
-                ) from None
+        if wrong := [one for one in self.allowed if not is_address(one)]:
+            hint = "name each sender by its address: ?allow=192.168.1.7,192.168.1.8"
+            raise InputError(f"allow has {wrong[0]!r}, which is no IP address", place=uri.text, hint=hint)
         if uri.port is None:
             raise InputError("names no port", place=uri.text, hint="write udp://127.0.0.1:9870")
-        if not uri.is_loopback() and not self.allowed:
+        if not is_loopback(uri.host) and not self.allowed:
             raise InputError(
                 "anyone could send samples here", place=uri.text,
                 hint="listen on 127.0.0.1, or name the senders: ?allow=192.168.1.7",
