@@ -327,6 +327,26 @@ async def test_a_receiver_on_a_serial_line(vehicle, port):
     assert rows[0].values["latitude"] == pytest.approx(48 + 7.038 / 60)
 
 
+async def test_a_receiver_that_sends_datagrams_beside_one_that_sends_json(vehicle, sender, port):
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        place = sentence("GPGGA,123500,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,")
+        speed = sentence("GPRMC,123500,A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
+        sender.send(
+            place + speed,
+            b"$GPRMC,garbled*00",
+            {"wheel_speed_fl": 3.0},
+            sentence("GPRMC,123501,V,,,,,,,230394,,,N"),
+        )
+        await until(lambda: service.feeds[0].messages == 3 and service.feeds[0].unreadable == 1)
+        await until(lambda: "ground_speed" in service.core.counts.by_channel)
+        counts = service.core.counts.by_channel
+        assert (counts["ground_speed"]["received"], counts["altitude"]["received"]) == (1, 1)
+        await until(lambda: events(service, "source_lost"))
+    assert "no fix" in events(service, "source_lost")[0]
+    assert "not a whole NMEA sentence" in events(service, "unreadable")[0]
+
+
 async def test_a_receiver_that_serves_by_tcp_is_lost_and_comes_back(vehicle):
     line = sentence("GPRMC,123500,A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
     with socket.create_server(("127.0.0.1", 0)) as server:

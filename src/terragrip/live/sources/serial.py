@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
 from terragrip.errors import InputError
-from terragrip.formats.nmea_sentences import sentences
 from terragrip.live.feed import Feed, Lost
+from terragrip.live.nmea import Sentences
 from terragrip.live.thread_bridge import ThreadBridge, repeated_in_thread
 from terragrip.live.uri import Uri
 
 _LONGEST = 512  # bytes of a line
-_FRAME = re.compile(r"[$!][A-Z][A-Z0-9]+,[^$!*]*\*[0-9A-Fa-f]{2}")  # a sentence of any kind
 
 
 class SerialSource:
@@ -24,26 +21,26 @@ class SerialSource:
         import serial  # noqa: F401
 
         self.uri = uri
-        self._has_rmc = False
         self.baud = round(uri.number("baud", 4800))
         if not uri.path:
             raise InputError("names no device", place=uri.text, hint="write serial:/dev/ttyUSB0")
         scheme, mark = uri.path.partition("://")[:2]
         if mark and scheme != "socket":
             raise InputError(
-                f"{scheme}:// is no line", place=uri.text, hint="write serial:socket://HOST:PORT"
+                f"{scheme}:// is no line",
+                place=uri.text,
+                hint="write serial:socket://HOST:PORT, or udp://HOST:PORT where sentences come in datagrams",
             )
 
     async def run(self, feed: Feed) -> None:
         """Feed sentences; raises Lost where the device is not there or goes away."""
         import serial
 
-        bridge, rest = ThreadBridge(feed), b""
+        bridge, rest, reader = ThreadBridge(feed), b"", Sentences(feed)
         try:
             line = serial.serial_for_url(self.uri.path, self.baud, timeout=0.2)
         except (serial.SerialException, ValueError) as error:
             raise Lost(f"the device: {error}") from error
-        feed.one_layout = False
         feed.connected()
 
         def read() -> None:
@@ -56,7 +53,7 @@ class SerialSource:
                     feed.reject, f"no line in {_LONGEST} bytes: is the receiver's baud rate {self.baud}?"
                 )
             for sentence in whole:
-                bridge.call(self._feed, feed, sentence)
+                bridge.call(reader.line, sentence)
 
         try:
             await repeated_in_thread(read)
@@ -64,16 +61,3 @@ class SerialSource:
             raise Lost(f"the device: {error}") from error
         finally:
             line.close()
-
-    def _feed(self, feed: Feed, line: bytes) -> None:
-        text = line.decode("ascii", "replace").strip()
-        good, damaged = sentences(text)
-        if damaged or (text and not _FRAME.search(text)):
-            feed.reject(f"not a whole NMEA sentence: {text[:30]!r}")
-        for sentence in good:
-            if sentence.kind == "VTG" and self._has_rmc:
-                continue  # it repeats the speed of RMC
-            self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
-            feed.excuse("" if sentence.has_fix else "its sentences have no fix")
-            if sentence.fields:
-                feed.fields(sentence.fields)

@@ -1,4 +1,4 @@
-"""Datagrams: JSON (an object, a list of them, one a line) or packed numbers by the profile's payload, as Simulink sends them."""
+"""Datagrams: JSON (an object, a list, one a line), packed numbers by the profile's payload, as Simulink sends them, or NMEA 0183."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Feed, Lost
+from terragrip.live.nmea import Sentences, holds_sentences
 from terragrip.live.uri import Uri, is_address, is_loopback
 
 _BUFFER = 4 << 20  # bytes asked for, so that a burst finds room
@@ -37,9 +38,9 @@ class UdpSource:
             )  # fmt: skip
 
     async def run(self, feed: Feed) -> None:
-        """Feed datagrams; raises Lost where the address cannot be had."""
+        """Feed datagrams; raises Lost where the address cannot be had, InputError where a package is missing that they need."""
         loop = asyncio.get_running_loop()
-        failed: asyncio.Future[str] = loop.create_future()
+        failed: asyncio.Future[None] = loop.create_future()
         try:
             link = self._socket()
         except OSError as error:
@@ -47,7 +48,7 @@ class UdpSource:
         loop.add_reader(link, _Receiver(link, feed, self.allowed, failed).read)
         feed.connected()
         try:
-            raise Lost(await failed)
+            await failed
         finally:
             loop.remove_reader(link)
             link.close()
@@ -71,9 +72,10 @@ class _Receiver:
     """
 
     def __init__(
-        self, link: socket.socket, feed: Feed, allowed: frozenset[str], failed: asyncio.Future[str]
+        self, link: socket.socket, feed: Feed, allowed: frozenset[str], failed: asyncio.Future[None]
     ) -> None:
         self._link, self._feed, self._allowed, self._failed = link, feed, allowed, failed
+        self._sentences = Sentences(feed)
         self._dropped = _dropped_by_system(link)
 
     def read(self) -> None:
@@ -83,13 +85,17 @@ class _Receiver:
                 data, address = self._link.recvfrom(_LONGEST)
                 if self._allowed and address[0] not in self._allowed:
                     self._feed.reject(f"from {address[0]}, which is not allowed")
+                elif holds_sentences(data):
+                    for line in data.splitlines():
+                        self._sentences.line(line)
                 else:
                     self._feed.message(data)
         except (BlockingIOError, InterruptedError):
             pass
-        except OSError as error:
+        except (OSError, InputError) as error:
             if not self._failed.done():
-                self._failed.set_result(str(error.strerror or error))
+                loss = Lost(error.strerror or str(error)) if isinstance(error, OSError) else error
+                self._failed.set_exception(loss)
         # A full buffer is read afterwards: so nothing is dropped that is not counted here.
         dropped = _dropped_by_system(self._link)
         if dropped != self._dropped:
