@@ -87,7 +87,7 @@ def test_a_torques_zero_weighs_by_the_load_that_it_turns() -> None:
     load = vehicle.axle_mass[vehicle.wheel_axle[rear]] / 2 * STANDARD_GRAVITY
     offset = 0.3 / vehicle.wheel_radius[rear]
     np.testing.assert_allclose(_adhesion_constants(vehicle, mu, rear)[:, 1], offset / load)
-    zeros = _resistance_constants(vehicle, one)[0][:, 1]
+    zeros = _resistance_constants(vehicle, one)[0][:, -1]
     np.testing.assert_allclose(zeros, 2 * offset / (vehicle.mass * STANDARD_GRAVITY))
 
 
@@ -135,10 +135,29 @@ def test_constants_are_not_averaged_away_by_passes() -> None:
     once = map_of([("a", estimates)]).cells["adhesion"]
     often = map_of([(name, estimates) for name in "abcdefgh"]).cells["adhesion"]
     assert np.all(often.passes >= 8)
-    mu_share = often.constant / often.value
-    np.testing.assert_allclose(mu_share, 0.05, rtol=0.02)
+    thrust = often.value + estimates.vehicle.tire_rolling_resistance
+    np.testing.assert_allclose(often.constant / thrust, 0.05, rtol=0.02)
     assert np.all(often.std >= often.constant)
     assert np.median(often.std) < np.median(once.std)
+
+
+@pytest.mark.parametrize(
+    ("known", "adhesion", "resistance"),
+    [
+        ({"tire_rolling_resistance": 0.02}, 0.02, 0.02),
+        ({"drawbar_gain": 0.1}, 0.0, 0.1 * (REFERENCE - 0.1)),
+        ({"mass": 0.1}, 0.1 * (REFERENCE + 0.03), 0.1 * (0.1 + 0.03)),
+    ],
+)
+def test_every_constant_that_is_stated_stays_in_each_cell(
+    known: dict[str, float], adhesion: float, resistance: float
+) -> None:
+    """In closed form (docs/physics.md 6): mu = T/(r F) - rho_t, rho_s = sum T/(r m g) - rho_t - D/(m g)."""
+    one = drive(*lanes(2, 30, 3), std=0.2)
+    one.about["vehicle"] |= {"uncertainty": known, "tire_rolling_resistance": 0.03}
+    cells = map_of([("a", one)], MapSettings(reference_slip=0.1)).cells
+    np.testing.assert_allclose(cells["adhesion"].constants[:, :3].sum(axis=1), adhesion, atol=1e-6)
+    np.testing.assert_allclose(cells["soil_resistance"].constant, resistance, atol=1e-6)
 
 
 def repeated(stated: float, passes: int) -> list[tuple[str, Estimates]]:

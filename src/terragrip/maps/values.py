@@ -165,8 +165,8 @@ def _reading(
 
 
 def _adhesion_constants(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
-    """What one SD of the vehicle file's constants changes in adhesion, mu = T/(r F_z) (n, 4): shares of it, the torque's zero, the
-    radius, and the curve's form, which is an error of x alone."""
+    """What one SD of the vehicle file's constants changes in adhesion, mu = T/(r F_z) - rho_t (n, 4): shares of the thrust, zeros (of the
+    torque, and the tyre's resistance), the radius, and the curve's form, which is an error of x alone."""
     known = vehicle.uncertainty
     share = np.hypot.reduce([
         known.drive_torque_gain or 0.0, known.drive_torque_gain_common or 0.0, known.vertical_load or 0.0, known.mass or 0.0,
@@ -174,18 +174,24 @@ def _adhesion_constants(vehicle: Vehicle, mu: Floats, wheel: int) -> Floats:
     axle = vehicle.wheel_axle[wheel]
     load = vehicle.axle_mass[axle] / np.sum(vehicle.wheel_axle == axle)
     offset = (known.drive_torque_offset or 0.0) / (vehicle.wheel_radius[wheel] * load * STANDARD_GRAVITY)
-    return np.column_stack([share * mu, np.full(len(mu), offset), -(known.wheel_radius or 0.0) * mu, 0 * mu])
+    zero = float(np.hypot(offset, known.tire_rolling_resistance or 0.0))
+    thrust = mu + vehicle.tire_rolling_resistance
+    radius = -(known.wheel_radius or 0.0) * thrust
+    return np.column_stack([share * thrust, np.full(len(mu), zero), radius, 0 * mu])
 
 
 def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Floats, float]:
-    """What one SD of the same constants changes in rho_s = mean mu - (drawbar + m a)/(m g) - slope (n, 2): shares of the thrust, and
-    zeros; and the SD of a slope which nothing measures, all that the estimates leave open where the vehicle file does not state it."""
+    """What one SD of the same constants changes in rho_s = sum T/(r m g) - rho_t - (drawbar + m a)/(m g) - slope (n, 4): shares of the
+    thrust, of the pull and of the mass, and zeros; and the SD of a slope which nothing measures, all that the estimates leave open where
+    the vehicle file does not state it."""
     known, driven = vehicle.uncertainty, max(int(np.sum(vehicle.driven)), 1)
-    mean = np.mean([estimates[f"adhesion_{wheel}"] for wheel in estimates.wheels], axis=0)
+    adhesion = np.mean([estimates[f"adhesion_{wheel}"] for wheel in estimates.wheels], axis=0)
+    thrust, rolling = (
+        rho + vehicle.tire_rolling_resistance for rho in (adhesion, estimates["soil_resistance"])
+    )
     weight = vehicle.mass * STANDARD_GRAVITY
     share = np.hypot.reduce([
-        (known.drive_torque_gain or 0.0) / np.sqrt(driven), known.drive_torque_gain_common or 0.0,
-        known.mass or 0.0, known.wheel_radius or 0.0,
+        (known.drive_torque_gain or 0.0) / np.sqrt(driven), known.drive_torque_gain_common or 0.0, known.wheel_radius or 0.0,
     ])  # fmt: skip
     offset = (
         (known.drive_torque_offset or 0.0) * np.sqrt(driven) / (float(vehicle.wheel_radius.mean()) * weight)
@@ -199,8 +205,10 @@ def _resistance_constants(vehicle: Vehicle, estimates: Estimates) -> tuple[Float
         slope = min(slope or np.inf, known.acceleration_bias / STANDARD_GRAVITY)
     elif "pitch" not in channels:
         slope, unmeasured = 0.0, slope or np.inf
-    zeros = float(np.hypot.reduce([offset, force, slope]))
-    return np.column_stack([share * mean, np.full(len(mean), zeros)]), unmeasured
+    zeros = float(np.hypot.reduce([offset, known.tire_rolling_resistance or 0.0, force, slope]))
+    pull = (known.drawbar_gain or 0.0) * (thrust - rolling)
+    constants = [share * thrust, pull, (known.mass or 0.0) * rolling, np.full(len(rolling), zeros)]
+    return np.column_stack(constants), unmeasured
 
 
 def _form(
