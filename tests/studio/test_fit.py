@@ -85,6 +85,27 @@ def test_enough_points_carry_intervals_and_a_band(client: TestClient) -> None:
     assert result["band"]["low"][30] < result["band"]["high"][30]
 
 
+def test_a_refit_of_a_library_is_no_surer_than_the_library(client: TestClient, folder: Path) -> None:
+    """Its bins share their error of slip, which no scatter of them shows; of one stretch `terragrip soils` gives no interval."""
+    sent = {"path": "soils.json", "soil": "grass"}
+    alone = fit(client, **sent).json()
+    assert alone["interval"] == {}
+    assert "no interval can be determined" in alone["notes"][0]
+    library = json.loads((folder / "soils.json").read_text())
+    library["soils"]["grass"] |= {"clusters": 20, "common_slip_sd": 0.02}
+    (folder / "soils.json").write_text(json.dumps(library))
+    low, high = fit(client, **sent).json()["interval"]["a"]
+    slip, mu = (np.array([one[key] for one in library["soils"]["grass"]["bins"]]) for key in ("slip", "mean"))
+    ends = [
+        fit(client, slip=(slip + off).tolist(), adhesion=mu.tolist()).json()["parameters"]["a"]
+        for off in (0.02, -0.02)
+    ]
+    assert high - low > ends[1] - ends[0]
+    gone = fit(client, path="soils.json", soil="moss")
+    assert gone.status_code == 422
+    assert "soils.json: has no soil 'moss'" in gone.json()["detail"]
+
+
 def test_too_few_points_get_a_sentence_and_no_curve(client: TestClient) -> None:
     for points in ({}, {"slip": [0.1], "adhesion": [0.2]}, {"slip": [0.1, 0.1], "adhesion": [0.2, 0.3]}):
         answer = fit(client, **points)

@@ -256,8 +256,8 @@ def _soil(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
     if not isinstance(bins, list) or not all(isinstance(b, dict) for b in bins):
         raise InputError("is not a list of bins", file=file, place=f"{place}.bins")
     for i, row in enumerate(bins):
-        for key, value in row.items():
-            _number(value, file, f"{place}.bins[{i}].{key}")
+        for key in ("slip", "mean", *row):
+            _number(row.get(key), file, f"{place}.bins[{i}].{key}")
     _refuse_bad_fit(entry, values, file, place)
     resistance = entry.get("resistance")
     known = {"model", "parameters", "interval", "r2", "nrmse", "bins", "resistance", "spread", "source"}
@@ -284,7 +284,8 @@ def _refuse_bad_fit(entry: Mapping[str, Any], values: Mapping[str, float], file:
     for key in ("settings", "identifiability", "by_slip"):
         if not isinstance(entry.get(key, {}), dict | None):
             raise InputError("is not a mapping", file=file, place=f"{place}.{key}")
-    _optional(entry.get("common_slip_sd"), file, f"{place}.common_slip_sd")
+    for key in ("common_slip_sd", "clusters"):
+        _optional(entry.get(key), file, f"{place}.{key}")
     badge, by_slip = entry.get("identifiability"), entry.get("by_slip")
     if badge:
         _number(badge.get("condition"), file, f"{place}.identifiability.condition")

@@ -55,6 +55,7 @@ async function fitTo(curve: Curve, data: Record<string, unknown>, source: string
   if (!found) return false;
   curve.fit = found;
   curve.parameters = { ...found.parameters };
+  curve.data = source;
   curve.source = `${FITTED}${source}`;
   return true;
 }
@@ -65,7 +66,7 @@ function held(curve: Curve): Record<string, number> | "free" {
   return Object.keys(values).length ? values : "free";
 }
 
-/** The data of the fit: a soil of estimates by name, else points. */
+/** The data of the fit: a soil of estimates or of a library by name, else points. */
 function points(state: State): Record<string, unknown> | null {
   const picture = /^picture:(.*)#(\d+)$/.exec(state.target);
   if (picture) {
@@ -77,10 +78,8 @@ function points(state: State): Record<string, unknown> | null {
 }
 
 function pointsOf(state: State, soil: Soil): Record<string, unknown> {
-  if (soil.path.endsWith(".parquet")) return { path: soil.path, soil: soil.soil, ...(state.by === "slip" ? { bins: { by: "slip" } } : {}) };
-  const bins = soil.bins.length > 0;
-  return {
-    slip: bins ? soil.bins.map((b) => b.slip) : soil.points.slip,
-    adhesion: bins ? soil.bins.map((b) => b.mean) : soil.points.adhesion,
-  };
+  const { path, soil: name, points } = soil;
+  if (path.endsWith(".json")) return { path, soil: name };
+  if (path.endsWith(".parquet")) return { path, soil: name, ...(state.by === "slip" ? { bins: { by: "slip" } } : {}) };
+  return { slip: points.slip, adhesion: points.adhesion };
 }

@@ -66,7 +66,7 @@ export class ListPanel {
       this.state.changed("curve");
     });
     const choose = (): void => {
-      kept.active = curve.id;
+      this.state.choose(curve);
       this.state.commit();
       this.state.changed("all");
     };
@@ -99,7 +99,7 @@ export class ListPanel {
       this.state.changed("data");
     };
     const remove = (): void => {
-      this.state.soils = this.state.soils.filter((other) => other !== soil);
+      this.state.remove(soil);
       this.state.changed("data");
     };
     return h(
@@ -167,10 +167,11 @@ export class ListPanel {
   async open(path: string): Promise<void> {
     if (!path) return;
     const served = await tried(() => get<Served[]>("soils", { path, by: this.state.by }));
+    const curves: Curve[] = [];
     for (const one of served ?? []) {
       const key = `${path}#${one.name}`;
       this.state.soils = this.state.soils.filter((soil) => soil.key !== key);
-      if (one.model && one.parameters) this.state.addCurve(one.model, one.parameters, one.name, one.source || path);
+      if (one.model && one.parameters) curves.push(Object.assign(this.state.addCurve(one.model, one.parameters, one.name, one.source || path), { data: key }));
       if (!one.bins?.length && !one.points?.slip.length) {
         if (one.note) note(`${path}: ${one.note}`, "error");
         continue;
@@ -189,6 +190,7 @@ export class ListPanel {
       });
       if (!this.state.target) this.state.target = key;
     }
+    if (curves[0]) this.state.choose(curves[0]);
     this.state.commit();
     this.state.changed("all");
     this.shown();

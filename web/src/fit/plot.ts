@@ -115,7 +115,8 @@ export class Plot {
     if (!target?.bins.length) return shape;
     const { r2, rms, count } = quality(target.bins, samples);
     const fitted = curve.fit && !sameCurve(curve) ? ` (fit ${digits(curve.fit.r2)})` : "";
-    return `${target.name}: R² ${digits(r2)}${fitted}, RMS ${digits(rms, 2)}, ${count} bins; ${shape}`;
+    const pair = curve.name === target.name ? target.name : `${curve.name} over ${target.name}`;
+    return `${pair}: R² ${digits(r2)}${fitted}, RMS ${digits(rms, 2)}, ${count} bins; ${shape}`;
   }
 
   private drawPictures(pen: CanvasRenderingContext2D): void {

@@ -58,6 +58,8 @@ export interface Curve {
   /** Ends that a fit keeps to, where they are not the model's own. */
   bounds: Record<string, [number, number]>;
   fit: FitResult | null;
+  /** Key of the soil that it was fitted to; empty where it goes through none's points. */
+  data: string;
   source: string;
 }
 
@@ -181,6 +183,18 @@ export class State {
     return this.kept.curves.find((curve) => curve.id === this.kept.active);
   }
 
+  /** Make a curve the active one, and the soil that it was fitted to the one that a fit uses: else "Fit to points" would draw it through another's. */
+  choose(curve: Curve): void {
+    this.kept.active = curve.id;
+    if (this.soils.some((soil) => soil.key === curve.data)) this.target = curve.data;
+  }
+
+  /** Forget a soil; where a fit would have used it, it uses the first that is left. */
+  remove(soil: Soil): void {
+    this.soils = this.soils.filter((other) => other !== soil);
+    if (this.target === soil.key) this.target = this.soils[0]?.key ?? "";
+  }
+
   model(name: string): Model | undefined {
     return this.models.find((model) => model.name === name);
   }
@@ -203,6 +217,7 @@ export class State {
       held: [...(chosen?.fixed ?? [])],
       bounds: {},
       fit: null,
+      data: "",
       source,
     };
     this.kept.curves.push(curve);

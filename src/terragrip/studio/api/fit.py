@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 from fastapi import APIRouter
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
 from terragrip.errors import InputError
@@ -43,7 +44,7 @@ class BinChoice(BaseModel):
 
 
 class FitRequest(BaseModel):
-    """Fit a model to points that are sent, or to a soil of a file of estimates."""
+    """Fit a model to points that are sent, or to a soil of a file of estimates or of a library."""
 
     model: str
     fixed: dict[str, FiniteFloat] | Literal["free"] | None = None
@@ -52,7 +53,7 @@ class FitRequest(BaseModel):
     weights: Literal["count"] | None = None
     slip: list[FiniteFloat] = Field(default=[], max_length=200_000)
     adhesion: list[FiniteFloat] = Field(default=[], max_length=200_000)
-    path: str | None = Field(None, description="Estimates of the folder, instead of points.")
+    path: str | None = Field(None, description="Estimates or a library, instead of points.")
     soil: str | None = None
     bins: BinChoice | None = Field(None, description="None: those of `terragrip soils`.")
     bootstrap: int = Field(1000, ge=0, le=5000)
@@ -104,18 +105,16 @@ def soils(studio: Here, path: Named, by: Literal["pull", "slip"] = "pull") -> li
 def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
     """Fit a curve; returns what soils.json would hold, and a band of the curve over slip.
 
-    A soil of estimates is fitted as `terragrip soils` does it, by the same bins.
-    Points that are sent (digitised, or bins of a library) count as a bin each.
+    A soil of estimates is fitted as `terragrip soils` does it, by the same bins. Points that are sent (digitised) count as a draw
+    each; the bins of a library are as many draws as it was learnt from, and share the error of slip that it keeps.
     """
-    if wanted.path is not None:
-        curve = _learned(studio, studio.folder.file(wanted.path), wanted).curve
+    if wanted.path is None:
+        slip = np.array(wanted.slip)
+        curve = _through(wanted, slip, np.array(wanted.adhesion), max(slip.size, 1), 0.0)
+    elif (target := studio.folder.file(wanted.path)).suffix.lower() == ".json":
+        curve = _refitted(wanted, SoilLibrary.load(target), wanted.path)
     else:
-        slip, adhesion = np.array(wanted.slip), np.array(wanted.adhesion)
-        if slip.size != adhesion.size:
-            raise InputError(f"{slip.size} slips but {adhesion.size} adhesions")
-        if slip.size < 2:
-            raise InputError("there are fewer than two points", hint="choose a soil, or click points")
-        curve = _unfitted(wanted, _bins_of_points(slip)).fit(slip, adhesion, np.arange(slip.size))
+        curve = _learned(studio, target, wanted).curve
     result: dict[str, Any] = curve.to_dict()
     grid = np.linspace(0.0, 1.0, 101)
     if curve.samples_ is not None:
@@ -150,6 +149,29 @@ def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
 def _plain(soil: Soil) -> dict[str, Any]:
     plain: dict[str, Any] = finite({"name": soil.name, **soil.to_dict()})
     return plain
+
+
+def _refitted(wanted: FitRequest, library: SoilLibrary, path: str) -> AdhesionCurve:
+    """A curve through the bins of a library's soil; InputError where there is no such soil, or it has no two bins."""
+    if wanted.soil is None or wanted.soil not in library:
+        raise InputError(f"has no soil {wanted.soil!r}", file=path, hint="open the library again")
+    soil = library[wanted.soil]
+    slip, mean = (np.array([one[key] for one in soil.bins]) for key in ("slip", "mean"))
+    draws = max(int(soil.fit.get("clusters") or slip.size), 1)
+    return _through(wanted, slip, mean, draws, float(soil.fit.get("common_slip_sd") or 0.0))
+
+
+def _through(
+    wanted: FitRequest, slip: NDArray[np.float64], adhesion: NDArray[np.float64], draws: int, slip_sd: float
+) -> AdhesionCurve:
+    """A curve through points (n,) of slip and adhesion, which came in that many draws, with an error of slip in common whose SD is
+    `slip_sd` (a share). Raises InputError if there are no two."""
+    if slip.size != adhesion.size:
+        raise InputError(f"{slip.size} slips but {adhesion.size} adhesions")
+    if slip.size < 2:
+        raise InputError("there are fewer than two points", hint="choose a soil, or click points")
+    curve = _unfitted(wanted, _bins_of_points(slip)).unfitted(common_slip_sd=slip_sd)
+    return curve.fit(slip, adhesion, np.arange(slip.size) % draws)
 
 
 def _bins_of_points(slip: np.ndarray[Any, Any]) -> BinSettings:
