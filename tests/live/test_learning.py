@@ -16,6 +16,7 @@ from terragrip.live import read_record
 from terragrip.live.core import Core, Settings
 from terragrip.live.outputs import Event, Row
 from terragrip.live.pipeline import Pipeline
+from terragrip.recording.checks import NOTHING_TOWED
 
 UNKNOWN = {"drawbar_force": 4.0, "pitch": 0.002}  # all else the log must tell
 
@@ -180,6 +181,17 @@ def test_a_channel_that_never_comes_is_named(vehicle, long, lost, words, learn):
     assert {out.estimate.event for out in outputs if isinstance(out, Row) and out.estimate.time > 3} == {
         "gap"
     }
+
+
+@pytest.mark.parametrize(
+    ("lost", "limit", "said"), [("", None, 0), ("drawbar_force", None, 1), ("drawbar_force", 500.0, 0)]
+)
+def test_a_pull_that_is_not_measured_is_said_as_of_a_log(long, lost, limit, said):
+    vehicle = robot(uncertainty={"drawbar_force": limit} if limit else {})
+    core = Core(vehicle, Settings(("udp://test",)))
+    rows = [(t, {n: v for n, v in sample.items() if n != lost}) for t, sample in rows_of(long.recording)]
+    outputs = [out for time, values in rows[:2200] for out in core.process(time, 0, time, values)]
+    assert sum(out.text == NOTHING_TOWED for out in outputs if isinstance(out, Event)) == said
 
 
 def test_torques_that_are_0_while_the_machine_pulls_are_an_event(vehicle, long):

@@ -87,13 +87,15 @@ class SettingsLearner:
         self._kept: dict[int, array[float]] = {}
 
     def used(self, estimator: TractionEstimator) -> tuple[dict[str, float], dict[str, float]]:
-        """Of what the estimator uses now, the SDs and update periods that were learned, neither given nor guessed."""
+        """Of what the estimator uses now, the SDs (where `WORTH` it) and update periods that were learned, neither given nor guessed."""
         given = {*self._noise, *estimator.guessed}
-        sensors = self._vehicle.sensors
+        stated = {
+            name: getattr(self._vehicle.sensors, sensor_of(name), None) or 0.0 for name in estimator.noise
+        }
         noise = {
             name: sd
             for name, sd in estimator.noise.items()
-            if name not in given and getattr(sensors, sensor_of(name), None) != sd
+            if name not in given and abs(sd - stated[name]) > WORTH * stated[name]
         }
         return noise, {name: period for name, period in estimator.held.items() if name not in self._held}
 

@@ -24,6 +24,7 @@ from terragrip.live.clock import Pace, SourceClock, Stamped
 from terragrip.live.counts import Counts
 from terragrip.live.outputs import Event, Output, Refusal, Row, Values, of_ground
 from terragrip.live.reorder import Pending, Reorder
+from terragrip.recording.checks import NOTHING_TOWED
 
 if TYPE_CHECKING:
     from terragrip.ground.live import LiveGround
@@ -216,8 +217,10 @@ class Core:
                     out += of_ground(state)
             if self.learner is not None:
                 self._learn(estimator, self.learner, row, out)
-        if self.reorder.changes:
-            self._report_changes(out)
+        out += [
+            Event(self.time, kind, self.settings.sources[n], text) for kind, n, text in self.reorder.changes
+        ]
+        self.reorder.changes.clear()
         return out
 
     def _learn(
@@ -241,11 +244,13 @@ class Core:
         """An event where channels without which nothing is estimated have not come since the start."""
         needed = [name for name in default_channels(self.vehicle) if name in absent]
         if not needed:
-            return []
+            known = "drawbar_force" not in absent or self.vehicle.uncertainty.drawbar_force is not None
+            return [] if known else [Event(time, "schema", "estimator", NOTHING_TOWED)]
         torques = [name for name in needed if name.startswith("drive_torque_")]
         text = f"{', '.join(needed)} never came: without that every row is a gap"
         if len(torques) == int(self.vehicle.driven.sum()):
-            text += "; for slip alone give a profile of the speeds, without torques"
+            speed = torques[0].replace("drive_torque", "wheel_speed")
+            text += f"; for slip alone give a profile of the speeds, without torques: 'channels: {{{speed}: {speed}, ...}}'"
         elif torques:
             text += "; name it in the profile, or write 'driven: false' for its axle in the vehicle file"
         return [Event(time, "schema", "estimator", text)]
@@ -256,13 +261,6 @@ class Core:
             self.event = estimate.event
             if estimate.event in _WARNINGS:
                 out.append(self._warning(estimate))
-
-    def _report_changes(self, out: list[Output]) -> None:
-        """Events of channels that stopped or came back."""
-        for kind, source, channel in self.reorder.changes:
-            text = f"{channel} no longer comes" if kind == "channel_lost" else f"{channel} is back"
-            out.append(Event(self.time, kind, self.settings.sources[source], text))
-        self.reorder.changes.clear()
 
     def _warning(self, estimate: Estimate) -> Event:
         """The estimator's event as one of ours, with what the machine did."""

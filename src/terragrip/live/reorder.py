@@ -17,12 +17,17 @@ from terragrip.live.counts import Counts
 from terragrip.live.outputs import Values
 
 LOST = 5  # periods
+DOUBLED = 100  # values of a channel, after which it is reported where they are over half of its own
+BUNDLES = 20  # holes behind bundles of samples, after which these are reported
+_LONG = 10  # samples that such a hole lacks at least
+_LARGEST = 50  # samples of a bundle
 _STEPS = 15  # of which the median is the period
 _FEWEST = 4  # steps before a period is known
 _LEARNING = 2.0  # s after which a stream without a period counts as irregular
 _RECENT = 512  # rows remembered to tell a doubled sample from a late one
 _LAYOUTS = 256  # sets of channels whose streams are kept
 _BEGINNING = float("-inf")
+_HOW = "send the time of each"
 
 
 @dataclass(slots=True)
@@ -41,11 +46,13 @@ class Stream:
     overdue: int = 0
     hole: float = float("inf")  # s: a longer step is one over missing samples
     calm: float = _BEGINNING  # up to this instant nothing is missing
+    holes: int = 0  # that lack `_LONG` samples and more
 
     def step_to(self, time: float) -> int:
         """A sample at ``time``; returns how many are missing before it."""
         step = time - self.last
         missing = round(step / self.period) - 1 if step > self.hole else 0
+        self.holes += missing >= _LONG
         self.steps.append(step)
         count = self.count = self.count + 1
         # Often at first, then now and then: a period hardly changes.
@@ -121,12 +128,12 @@ class Reorder:
         self.pending: list[Pending] = []
         self.released = _BEGINNING
         self._recent: deque[tuple[float, tuple[str, ...]]] = deque(maxlen=_RECENT)
-        self.changes: list[tuple[str, int, str]] = []  # ("channel_lost" | "channel_back", source, channel)
+        self.changes: list[tuple[str, int, str]] = []  # to be reported: kind of event, source, sentence
 
     def add(self, arrival: float, source: int, time: float, values: Values) -> Values:
         """Add a sample; returns the values that found no place (late or doubled)."""
         if time <= self.released:
-            return self._refuse(time, values)
+            return self._refuse(source, time, values)
         pending = self.pending
         place = len(pending)
         while place and pending[place - 1].time > time:
@@ -135,14 +142,22 @@ class Reorder:
             pending.insert(place, Pending(time, arrival, values, ((source, tuple(values)),)))
             return {}
         doubled = pending[place - 1].merge(source, values)
-        self.counts.add("doubled", doubled)
+        self._count_doubled(source, doubled)
         return doubled
 
-    def _refuse(self, time: float, values: Values) -> Values:
+    def _refuse(self, source: int, time: float, values: Values) -> Values:
         known: tuple[str, ...] = next((names for when, names in self._recent if when == time), ())
-        for name in values:
-            self.counts.add("doubled" if name in known else "late", (name,))
+        self._count_doubled(source, [name for name in values if name in known])
+        self.counts.add("late", [name for name in values if name not in known])
         return values
+
+    def _count_doubled(self, source: int, names: Collection[str]) -> None:
+        self.counts.add("doubled", names)
+        by = self.counts.by_channel
+        most = [n for n in names if by[n]["doubled"] == DOUBLED and by[n]["received"] < 2 * DOUBLED]
+        if most:
+            text = f"{', '.join(most)}: over half of the samples have the stamp of the one before, and are refused: {_HOW}"
+            self.changes.append(("late", source, text))
 
     def ready(self, now: float) -> list[Pending]:
         """The rows whose time has come, in order."""
@@ -186,7 +201,9 @@ class Reorder:
         for stream in present:
             if stream.overdue:
                 if stream.overdue >= LOST:
-                    self.changes += [("channel_back", stream.source, name) for name in stream.channels]
+                    self.changes += [
+                        ("channel_back", stream.source, f"{name} is back") for name in stream.channels
+                    ]
                 stream.overdue = 0
             self._step(stream, row.time)
         if expired:
@@ -199,6 +216,11 @@ class Reorder:
         missing = stream.step_to(time)
         if missing:
             self.counts.add("missing", stream.channels, missing)
+            if missing >= _LONG and stream.holes == BUNDLES and stream.count <= BUNDLES * _LARGEST:
+                text = (
+                    f"{', '.join(stream.channels)}: samples come in bundles, stamped as these arrive: {_HOW}"
+                )
+                self.changes.append(("late", stream.source, text))
 
     def _begin(self, row: Pending, old: Collection[tuple[int, str]]) -> None:
         """Begin a stream for each source's channels that no stream holds yet."""
@@ -216,7 +238,9 @@ class Reorder:
             while stream.due_from + stream.period - stream.tolerance <= time and stream.overdue < LOST:
                 stream.give_up()
             if stream.overdue >= LOST:
-                self.changes += [("channel_lost", stream.source, name) for name in stream.channels]
+                self.changes += [
+                    ("channel_lost", stream.source, f"{name} no longer comes") for name in stream.channels
+                ]
 
     def flush(self) -> list[Pending]:
         """All that is left, in order: the source has ended."""
