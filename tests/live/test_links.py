@@ -180,7 +180,7 @@ async def test_zenoh_whose_other_side_is_absent_is_named(vehicle, port):
 
 async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle, short, port, sender):
     sink = f"foxglove://127.0.0.1:{port}?mcap={tmp_path / 'mcap'}"
-    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [sink])
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [sink], options=Options(setpoint=(0.11, 1.0)))
     sent = messages(short.recording, len(short.recording))
     async with (
         running(service),
@@ -211,6 +211,11 @@ async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle,
     )
 
     (path,) = (tmp_path / "mcap").iterdir()
+    with path.open("rb") as stream:
+        logged = [(c.topic, m.log_time) for _, c, m in make_reader(stream).iter_messages()]
+    assert {topic.rpartition("/")[2] for topic, _ in logged} >= {"estimate", "setpoint", "status"}
+    times = [time for _, time in logged]
+    assert max(times) - min(times) < 600e9  # on one time base, whatever that of the stamps is
     with path.open("rb") as stream:
         recorded = [
             (s.name, json.loads(m.data))
@@ -244,6 +249,13 @@ async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, p
     async with running(service):
         async with connect(f"ws://127.0.0.1:{port}/?columns=slip_fl") as text:
             hello, first = json.loads(await text.recv()), json.loads(await text.recv())
+            service.inbox.event("late", "a source", "a sentence")
+            while json.loads(one := await text.recv())["kind"] in ("estimate", "status"):
+                pass
+            assert one.count('"kind"') == 1
+            assert json.loads(one) | {"time": 0} == {
+                "kind": "late", "time": 0, "source": "a source", "text": "a sentence",
+            }  # fmt: skip
         async with connect(f"ws://127.0.0.1:{port}/?format=binary&columns=slip_fl*&rate=20") as packed:
             columns = json.loads(await packed.recv())["columns"]
             result = [await packed.recv() for _ in range(10)]

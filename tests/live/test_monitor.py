@@ -14,7 +14,6 @@ from terragrip.live.core import Core, Settings
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
-from terragrip.live.monitor import _silent
 from terragrip.live.payload import unpacker
 from terragrip.live.pulse import Pulse
 from terragrip.live.service import Service
@@ -191,8 +190,8 @@ async def test_a_receiver_without_a_fix_that_falls_silent_has_no_excuse_any_more
     now = 110.0
     feed.excuse("its sentences have no fix")
     assert feed.excuse_at(110.5) == "its sentences have no fix"
-    assert (_silent(one, 110.5) or "").endswith(": its sentences have no fix")
-    assert _silent(one, 130.0) == "nothing came from serial:x for 30.0 s"
+    assert (one.why_old(110.5) or "").endswith(": its sentences have no fix")
+    assert one.why_old(130.0) == "nothing came from serial:x for 30.0 s"
 
 
 async def test_a_slow_source_beside_a_fast_one_is_not_lost_between_its_messages(vehicle, short, port, sender):
@@ -230,3 +229,4 @@ async def test_a_source_of_one_message_a_second_is_not_lost_before_its_period_is
         statistics.watch(now[0])
         lost += [tick for note in box.notes() if "event" in note]
     assert lost == [49]  # more than two periods after the last
+    assert statistics.to_dict()["silent"] == ["nothing came from udp://a for 7.3 s"]

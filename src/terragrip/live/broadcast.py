@@ -1,8 +1,8 @@
 """Messages to any number of WebSocket clients, each with a queue of its own; the studio mounts this.
 
 First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "events"}``. Then JSON texts
-``{"kind": "estimate", …}``, ``event``, ``status``, ``soil``, ``ground``, ``setpoint``. A client that asks for binary gets estimates as
-little-endian doubles instead: time [s], 1 if predicted, the event's place in ``events``, then ``columns`` in order.
+``{"kind": "estimate", …}``, ``status``, ``soil``, ``ground``, ``setpoint``; the ``kind`` of an event is its own. A client that asks for
+binary gets estimates as little-endian doubles: time [s], 1 if predicted, the place of the event in ``events``, then ``columns`` in order.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import AsyncGenerator, Sequence
 from terragrip import __version__
 from terragrip.estimation.columns import wheels_with
 from terragrip.estimation.engine import EVENTS
-from terragrip.live.message import ESTIMATE, Message
+from terragrip.live.message import ESTIMATE, EVENT, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri
 
@@ -64,6 +64,8 @@ class Broadcast:
                     event = EVENTS.index(row.estimate.event)
                     numbers = (values[places[n]] if n in places else math.nan for n in columns)
                     yield packer.pack(row.estimate.time, row.predicted, event, *numbers)
+                elif message.kind == EVENT:
+                    yield message.json().decode()
                 else:
                     yield _named(
                         message.kind, message.json(client.columns if message.kind == ESTIMATE else None)

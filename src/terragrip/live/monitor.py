@@ -8,7 +8,7 @@ from terragrip.live.counts import FATES
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
 from terragrip.live.pipeline import Pipeline
-from terragrip.live.pulse import FLOOR, Pulse
+from terragrip.live.pulse import FLOOR
 from terragrip.live.statistics import Statistics
 from terragrip.prometheus_text import METRICS, Labels, Metrics
 
@@ -91,7 +91,7 @@ class Monitor:
         now = statistics.now()
         if statistics.is_real_time:
             for pulse in statistics.pulses:
-                why = _silent(pulse, now)
+                why = pulse.why_old(now)
                 if why is not None:
                     return why
         if not statistics.rows:
@@ -114,14 +114,3 @@ def add_sinks(page: Metrics, outboxes: Sequence[Outbox]) -> None:
     page.add("counter", name("sent_total"), "Messages to a sink.", [(n, box.sent) for n, box in boxes])
     lost = [(label, box.dropped) for label, box in boxes]
     page.add("counter", name("dropped_total"), "Messages dropped because a sink was too slow.", lost)
-
-
-def _silent(pulse: Pulse, now: float) -> str | None:
-    silence = pulse.silence(now)
-    excuse = pulse.feed.excuse_at(now)
-    why = f": {excuse}" if excuse else ""
-    if not pulse.has_begun:
-        return f"nothing has come from {pulse.feed.name} yet{why}"
-    if silence > max(FLOOR, 2.0 * pulse.period):
-        return f"nothing came from {pulse.feed.name} for {silence:.1f} s{why}"
-    return None

@@ -37,6 +37,15 @@ class Pulse:
     def _messages(self) -> int:
         return self.feed.messages + self.feed.unreadable
 
+    def why_old(self, now: float) -> str | None:
+        """What is said where nothing came for twice the period, and `FLOOR`; None where something did."""
+        silence, excuse = self.silence(now), self.feed.excuse_at(now)
+        why = f": {excuse}" if excuse else ""
+        if not self.has_begun:
+            return f"nothing has come from {self.feed.name} yet{why}"
+        old = silence > max(FLOOR, 2.0 * self.period)
+        return f"nothing came from {self.feed.name} for {silence:.1f} s{why}" if old else None
+
     @property
     def period(self) -> float:
         """Usual time between two messages [s], of the last ones."""

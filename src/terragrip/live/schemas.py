@@ -62,6 +62,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "row_rate": _NUMBER,
         "sample_rate": _NUMBER,
         "delay": {"type": "number", "description": "s, mean, from a row's first sample to its estimate"},
+        "silent": {"type": "array", "items": _TEXT, "description": "sources of which nothing came lately"},
         "waiting": _COUNT,
         "counts": {
             "type": "object",

@@ -134,7 +134,7 @@ class Statistics:
     def to_dict(self) -> dict[str, Any]:
         """The status, as sinks get it."""
         core = self._core
-        result = {
+        result: dict[str, Any] = {
             "time": core.time if core.rows else None,
             "rows": core.rows,
             "row_rate": round(self.row_rate, 2),
@@ -144,8 +144,11 @@ class Statistics:
             "events": dict(self.event_counts),
             "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in self._outboxes},
         }
-        # A replay's rows arrive at their own stamps: what they take is no delay.
-        return {**result, "delay": self.delay} if self.is_real_time else result
+        if self.is_real_time:  # a replay's rows arrive at their own stamps, and its pauses are the file's
+            now = self._inbox.clock()
+            silent = [why for pulse in self.pulses if (why := pulse.why_old(now))]
+            result |= {"delay": self.delay, "silent": silent}
+        return result
 
     def summary(self) -> str:
         """The run in a few lines of text."""

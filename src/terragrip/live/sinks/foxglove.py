@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.files import unwritable
 from terragrip.live.feed import Lost
-from terragrip.live.message import EVENT, STATUS, Message
+from terragrip.live.message import Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.schemas import NAMES, schema_of
 from terragrip.live.uri import Uri, is_loopback
@@ -41,6 +41,7 @@ class FoxgloveSink:
         self._channels = {kind: self._channel(kind, columns) for kind in NAMES}
         self._writer: Any = None
         self._began = self._flushed = 0.0
+        self._arrival = time.time()  # of the newest row: other messages are as old as that
 
     def _channel(self, kind: str, columns: Sequence[str]) -> Any:
         import json
@@ -76,7 +77,10 @@ class FoxgloveSink:
 
     def _log(self, message: Message, outbox: Outbox) -> None:
         self._rotate()
-        self._channels[message.kind].log(message.json(outbox.columns), log_time=_nanoseconds(message))
+        if message.row is not None:
+            self._arrival = message.row.arrival
+        at = max(0, round(1e9 * self._arrival))
+        self._channels[message.kind].log(message.json(outbox.columns), log_time=at)
 
     def _rotate(self) -> None:
         """Open, flush or change the MCAP file as time goes."""
@@ -106,11 +110,3 @@ class FoxgloveSink:
         except (OSError, RuntimeError, ValueError) as error:
             self._writer = None
             raise unwritable(self._folder, error, "free space or choose another folder") from error
-
-
-def _nanoseconds(message: Message) -> int:
-    if message.row is not None:
-        return max(0, round(1e9 * message.row.arrival))
-    if message.kind in (EVENT, STATUS) or message.time != message.time:
-        return time.time_ns()
-    return max(0, round(1e9 * message.time))
