@@ -8,6 +8,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,9 +26,11 @@ from terragrip.estimation import Estimates
 from terragrip.files import lock
 from terragrip.fleet.cluster import Pool
 from terragrip.fleet.dataset import known_notes, settled, write_tables
+from terragrip.fleet.doubts import compared, unlike
 from terragrip.fleet.logs import FleetLog, fleet_logs, on_disk
 from terragrip.fleet.run import FleetResult
 from terragrip.fleet.store import Store
+from terragrip.fleet.tally import MEANS
 from terragrip.fleet.task import Outcome, _attempt
 from terragrip.ground.analysis import analyse
 
@@ -256,6 +259,37 @@ def test_a_copy_of_a_log_is_named(place: Path, estimated: Path, ran: Ran) -> Non
     assert list(summary.index[summary["left_out"] != ""]) == ["drive1.csv"]
     assert summary.loc["drive1.csv", "left_out"] == "a copy of drive1 (copy).csv"
     assert np.isnan(summary.loc["drive1.csv", "slip"])
+
+
+def noted(log: str, vehicle: str, start: str, **means: float) -> dict[str, Any]:
+    """A note of a log of 20 s, as far as logs are compared by it."""
+    summary = {"vehicle": vehicle, "start": start, "duration": 20.0, "moving_time": 20.0, "notes": ""}
+    return {"log": log, "content": log, "summary": {**summary, **dict.fromkeys(MEANS), **means}}
+
+
+def test_drives_of_one_machine_that_overlap_are_named() -> None:
+    """Two loggers of a drive, or two machines of one name; clocks of other zones are no other time."""
+    starts = {
+        "a": ("Heros", "2026-05-01T08:00:00+00:00"),
+        "b": ("Heros", "2026-05-01T10:00:05+02:00"),
+        "c": ("Heros", "2026-05-01T08:00:25+00:00"),
+        "d": ("Thorvald", "2026-05-01T08:00:00+00:00"),
+        "e": ("Heros", "2026-05-01T08:00:00+02:00"),
+    }
+    notes = compared([noted(log, *where) for log, where in starts.items()])
+    said = {note["log"]: note["summary"]["notes"] for note in notes if note["summary"]["notes"]}
+    assert list(said) == ["b"]
+    assert "overlaps a by 15 s" in said["b"]
+
+
+def test_a_vehicle_file_that_is_wrong_makes_its_machine_unlike_the_others() -> None:
+    """Forty machines, one stated a tenth too large in radius, so that its slip is .21 for .13; not those that differ as machines do."""
+    rng = np.random.default_rng(1)
+    slips = {f"M{k}": 0.13 + 0.01 * rng.standard_normal() for k in range(40)} | {"M19": 0.21}
+    rows = [one["summary"] for one in compared([noted(m, m, "", slip=s) for m, s in slips.items()])]
+    assert list(unlike(rows)) == ["M19"]
+    assert unlike(rows)["M19"].startswith("slip 0.21 (others 0.13")
+    assert unlike(rows[12:21]) == {}, "too few to say what is usual"
 
 
 Refused = Callable[..., str]

@@ -200,6 +200,12 @@ def _lines(done: FleetResult, output: str) -> list[str]:
     ]
     if len(done.left_out) > 10:
         lines.append(f"  and {len(done.left_out) - 10} more left out, in summary.parquet")
+    lines += [
+        f"  {name} is unlike the other vehicles: {means}; other ground or work, or its vehicle file is wrong"
+        for name, means in list(done.unlike.items())[:10]
+    ]
+    if len(done.unlike) > 10:
+        lines.append(f"  and {len(done.unlike) - 10} more unlike the others, in the report")
     if done.kept:
         kept = "1 log of earlier calls is" if done.kept == 1 else f"{done.kept} logs of earlier calls are"
         lines.append(f"{kept} kept.")

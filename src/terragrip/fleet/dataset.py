@@ -9,7 +9,7 @@ from typing import Any
 
 from terragrip.errors import InputError
 from terragrip.fleet.store import Store
-from terragrip.fleet.tally import COUNTED, MEANS, impossible
+from terragrip.fleet.tally import COUNTED, MEANS
 from terragrip.fleet.task import NOTES, SAMPLES, Outcome, is_whole
 
 SUMMARY, FAILURES, BY_SOIL = "summary.parquet", "failures.parquet", "soils.parquet"
@@ -113,26 +113,6 @@ def _drop(store: Store, old: Note, keep: Note | None) -> None:
 def _files(note: Note) -> set[str]:
     """A log's files in the data set."""
     return {note["file"], *note.get("extra", {}).values()}
-
-
-def with_left_out(notes: Sequence[Note]) -> list[Note]:
-    """The notes, each with the reason ``left_out`` in its summary ("": counted).
-
-    A copy of a log before and a log with a mean that no machine can have count in no mean and no curve: they have no means, no
-    rows by soil and no sample.
-    """
-    first: dict[str, str] = {}
-    result = []
-    for note in notes:
-        content, summary = note.get("content"), note["summary"]  # earlier calls kept no content
-        copied = bool(content) and first.setdefault(str(content), note["log"]) != note["log"]
-        why = f"a copy of {first[str(content)]}" if copied else impossible(summary)
-        note = {**note, "summary": {**summary, "left_out": why}}
-        if why:
-            none = dict.fromkeys(MEANS)
-            note |= {"sample": False, "soils": [], "summary": {**note["summary"], **none}}
-        result.append(note)
-    return result
 
 
 def write_tables(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from terragrip.fleet.curves import FleetCurves
 from terragrip.fleet.dataset import soil_rows
+from terragrip.fleet.doubts import unlike
 from terragrip.fleet.tally import weighted
 from terragrip.report.curves import maxima
 from terragrip.report.page import Headline, Page, Picture, Section, Table, number, percent, render
@@ -70,7 +71,11 @@ def _by_vehicle(rows: Sequence[Row]) -> Section:
             for name, group in groups.items()
         ),
     )
-    return Section("vehicles", "By vehicle", content=(table,)) if rows else _nothing("vehicles", "By vehicle")
+    odd = tuple(
+        f"{name} is unlike the other vehicles: {means}. Other ground or other work, or its vehicle file is wrong."
+        for name, means in unlike(rows).items()
+    )
+    return Section("vehicles", "By vehicle", odd, (table,)) if rows else _nothing("vehicles", "By vehicle")
 
 
 def _by_day(rows: Sequence[Row]) -> Section:

@@ -18,10 +18,10 @@ from terragrip.fleet.dataset import (
     Note,
     known_notes,
     settled,
-    with_left_out,
     write_tables,
     write_text,
 )
+from terragrip.fleet.doubts import compared, unlike
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.page import report_of
 from terragrip.fleet.store import TEMPORARY, Store
@@ -38,7 +38,8 @@ class FleetResult:
     reasons by log, ``unwritten`` of them for lack of disk space; ``kept``: logs of earlier calls that this one did not name; ``noted``:
     logs named now whose estimates have notes. Of the logs
     estimated now: ``rows``, ``restarts`` of the filter, and of each log ``nis`` over its expected value and the ``seconds`` of a worker.
-    ``left_out``: of the logs in the data set, why means and curves do not count them."""
+    Of the data set, ``left_out``: logs that means and curves do not count, with the reason; ``unlike``: machines with the means in which
+    they are far from the others."""
 
     estimated: int
     unchanged: int
@@ -51,6 +52,7 @@ class FleetResult:
     nis: tuple[float, ...]
     seconds: tuple[float, ...]
     left_out: dict[str, str] = field(default_factory=dict)
+    unlike: dict[str, str] = field(default_factory=dict)
 
 
 def run_fleet(
@@ -112,7 +114,7 @@ def run_fleet(
             except InputError as error:  # the workers are gone; still write the tables of what is done
                 stopped = error
             notes, reasons = settled(store, before, failed, outcomes)
-            notes = with_left_out(notes)
+            notes = compared(notes)
             _write(store, notes, reasons)
             if stopped is not None:
                 raise stopped
@@ -134,6 +136,7 @@ def run_fleet(
         nis=tuple(one["nis"] for one in fresh if one["nis"] is not None),
         seconds=tuple(one.seconds for one in outcomes if one.fresh),
         left_out={note["log"]: why for note in notes if (why := note["summary"]["left_out"])},
+        unlike=unlike([note["summary"] for note in notes]),
     )
     counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
     emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)
