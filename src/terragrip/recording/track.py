@@ -23,6 +23,8 @@ _SLOWEST = 0.3  # m/s: slower, a course is noise
 _VAGUE_TURN = 0.03  # rad/s, and
 _VAGUE_GRADE = 0.02  # rad: SDs above which no value is given
 _GRADE_WAY = 16.0  # m
+_DENSE = 40
+"""Fixes a window: denser ones, as of positions interpolated to the rate of the wheels, count as their means."""
 _BLOCK = 200_000
 """Numbers of windows at once: the hour of a logger that counts minutes for seconds has windows of 2400 fixes, gigabytes together."""
 
@@ -80,23 +82,34 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     rows = rows[fresh]
     if len(rows) < 10:
         return None
-    time, north, east = recording.time[rows], north[rows], east[rows]
+    time, north, east = _means(window / _DENSE, recording.time[rows], north[rows], east[rows])
+    fixes = len(time)
     span = max(5, int(window / max(median(np.diff(time)), 1e-6)) | 1)
-    if len(rows) < span:
+    if fixes < span:
         return None
     half = span // 2
-    middle = slice(half, len(rows) - half)
-    fits = [_fitted(time, x, np.arange(half, len(rows) - half), span, 2) for x in (north, east)]
+    middle = slice(half, fixes - half)
+    fits = [_fitted(time, x, np.arange(half, fixes - half), span, 2) for x in (north, east)]
     (_, vn, an), (_, ve, ae) = (result.T for result, _ in fits)
     an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
     speed = np.hypot(vn, ve)
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
-    reach = (time[2 * half :] - time[middle]) - (time[: len(rows) - 2 * half] - time[middle])
+    reach = (time[2 * half :] - time[middle]) - (time[: fixes - 2 * half] - time[middle])
     gap = reach > 3 * max(window, median(reach))
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     altitude = _altitude(recording, time[middle])
     return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap)
+
+
+def _means(step: float, time: Floats, *values: Floats) -> tuple[Floats, ...]:
+    """Time (n,) and values, each the means of those within a `step` [s], if most are closer than that."""
+    if not median(np.diff(time)) < 0.75 * step:  # of fixes hardly denser some would stand alone
+        return (time, *values)
+    number = np.floor((time - time[0]) / step)
+    first = np.flatnonzero(np.r_[True, np.diff(number) != 0])
+    count = np.diff(np.r_[first, len(time)])
+    return tuple(x[0] + np.add.reduceat(x - x[0], first) / count for x in (time, *values))
 
 
 def _altitude(recording: Recording, time: Floats) -> Floats:
