@@ -169,7 +169,8 @@ def test_positions_interpolated_to_the_rate_of_the_wheels_turn_as_those_of_the_r
     }
     plain = track_of(Recording(receiver, angles), 4.0)
     dense = track_of(Recording(log, {n: np.interp(log, receiver, v) for n, v in angles.items()}), 4.0)
-    assert plain is not None and dense is not None
+    assert plain is not None
+    assert dense is not None
     assert len(dense.time) < 1.1 * len(plain.time)
     when = np.arange(5.0, 55.0)
     np.testing.assert_allclose(dense.at("turn", when), 0.1, atol=0.01)
