@@ -159,7 +159,7 @@ def test_altitude_is_that_of_the_instant() -> None:
 
 
 def test_positions_interpolated_to_the_rate_of_the_wheels_turn_as_those_of_the_receiver() -> None:
-    """A circle of 10 m at 1 m/s, by a receiver of 10 Hz that errs by 1 cm, in a log of 100 Hz: ten fixes a second tell all, not a hundred."""
+    """A circle of 10 m at 1 m/s, by a receiver of 10 Hz that errs by 1 cm, in a log of 100 Hz: ten fixes a second are enough."""
     receiver, log = np.arange(0.0, 60.0, 0.1), np.arange(0.0, 59.9, 0.01)
     noise = 0.01 * np.random.default_rng(3).standard_normal((2, len(receiver)))
     east, north = 10.0 * np.cos(receiver / 10.0) + noise[0], 10.0 * np.sin(receiver / 10.0) + noise[1]
