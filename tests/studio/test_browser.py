@@ -291,9 +291,14 @@ def test_a_broken_file_is_refused_with_one_line_and_a_good_one_estimated(
 def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, folder: Path) -> None:
     page.goto(served.url)
     page.wait_for_selector("text=recording.parquet")
+    wanted = {"recording": "recording.parquet", "vehicle": "vehicle.yaml"}
+    for output in ("one.parquet", "two.parquet"):
+        page.request.post(f"{served.url}/api/jobs/estimate", data={**wanted, "output": output})
+    page.wait_for_selector(".state:has-text('waits for the one before')")
     served.stop()
     page.wait_for_selector("text=does not respond; trying again")
     served.start()
+    page.wait_for_function("() => document.querySelectorAll('.state.interrupted').length === 2")
     page.wait_for_function("() => document.getElementById('connection').textContent === ''")
     (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")
     page.wait_for_selector("text=late.csv")

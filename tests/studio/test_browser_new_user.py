@@ -227,12 +227,19 @@ def test_of_several_vehicles_none_is_taken_for_the_logs(
     page.goto(f"{served.url}/#/start?log=a.parquet")
     page.wait_for_selector("#wizard-found:has-text('choose the vehicle')")
     assert page.is_disabled("#wizard-go")
-    page.select_option("#wizard-vehicle", "robot.yaml")
+    page.select_option("#wizard-vehicle", "big.yaml")
     page.wait_for_selector("text=ready to estimate")
     page.click("#wizard-go")
     page.wait_for_selector("#next-soils")
-    page.reload()  # the choice is known by the work that was done
-    page.wait_for_selector("#next-soils")
+    page.click("#next-soils")
+    page.wait_for_selector("#see-soils")
+    page.select_option("#wizard-vehicle", "robot.yaml")
+    page.wait_for_selector("#wizard-go:enabled")
+    page.click("#wizard-go")
+    page.wait_for_selector("#see-estimate:has-text('a-estimates-2.parquet')")
+    assert not page.query_selector("#see-soils")  # a report would have shown the curve of the wrong vehicle
+    page.reload()  # the last choice is known by the work that was done
+    page.wait_for_selector("#see-estimate:has-text('a-estimates-2.parquet')")
     assert page.input_value("#wizard-vehicle") == "robot.yaml"
     page.goto(f"{served.url}/#/start")
     page.click("[data-key='do batch']")

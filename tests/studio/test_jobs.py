@@ -70,6 +70,16 @@ def test_a_log_that_does_not_fit_fails_with_one_line(client: TestClient, folder:
     assert not (folder / "new.parquet").exists()
 
 
+def test_two_jobs_do_not_write_one_file(client: TestClient) -> None:
+    """The second replaced what the first had made, without a word, though it was told not to replace."""
+    first = ask(client).json()["id"]
+    again = ask(client, output="./new.parquet", method="ukf")
+    assert again.status_code == 422
+    assert "will be written by another job" in again.json()["detail"]
+    client.delete(f"/api/jobs/{first}")
+    assert ask(client).status_code == 202
+
+
 def test_a_cancelled_job_leaves_nothing(client: TestClient, folder: Path) -> None:
     table = pd.read_parquet(folder / "recording.parquet")
     span = float(table["time"].iloc[-1] - table["time"].iloc[0]) + 0.01

@@ -42,8 +42,15 @@ class Jobs:
     def add(self, kind: str, title: str, output: str, words: Sequence[str]) -> Job:
         """Queue a job; `words` is its command line after "terragrip", `output` the path that it will write.
 
-        Raises InputError where the folder cannot be written.
+        Raises InputError where the folder cannot be written, or a job that has not ended will write the same path.
         """
+        same = Path(output)
+        if any(job.state not in ENDED and Path(job.output) == same for job in self._jobs.values()):
+            raise InputError(
+                "will be written by another job",
+                file=output,
+                hint="wait for it, cancel it, or choose another name",
+            )
         job = Job(secrets.token_hex(8), kind, title, output, words=tuple(words))
         self._store.save(job)
         self._jobs[job.id] = job

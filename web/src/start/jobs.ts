@@ -1,6 +1,6 @@
 /** Work under way and done: progress, cancel, how it ended, its command line for the next time. */
 
-import { get, send, type Item, type Job, type Notice, type Notices } from "../ui/api";
+import { get, isGoing, isOlder, send, type Item, type Job, type Notices } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { onceReleased } from "../ui/press";
@@ -47,26 +47,36 @@ export class JobList {
     private listed: (job: Job) => boolean = () => true,
   ) {
     this.element.append(h("h2", {}, "Work"), this.list);
-    this.leave = notices.on((notice) => this.update(notice));
-    void tried(async () => {
-      for (const job of await get<Job[]>("jobs")) if (!this.jobs.has(job.id)) this.jobs.set(job.id, job);
-      this.draw();
+    this.leave = notices.on((notice) => {
+      if (notice.kind === "job") this.update(notice.job);
+      else if (notice.kind === "connection" && notice.up) void this.ask((job) => this.update(job)); // what ended meanwhile was told to nobody
     });
+    void this.ask((job) => void (this.jobs.has(job.id) || this.jobs.set(job.id, job)));
   }
 
-  private update(notice: Notice): void {
-    if (notice.kind !== "job") return;
-    const { job } = notice;
-    const before = this.jobs.get(job.id)?.state;
+  private async ask(take: (job: Job) => void): Promise<void> {
+    (await tried(() => get<Job[]>("jobs")))?.forEach(take);
+    this.draw();
+  }
+
+  /** What the jobs that wait or run will write: names that are taken. */
+  get pending(): Item[] {
+    return [...this.jobs.values()].filter(isGoing).map(({ output }) => ({ path: output, kind: "", size: 0, modified: 0 }));
+  }
+
+  update(job: Job): void {
+    const before = this.jobs.get(job.id);
+    if (before && isOlder(job, before)) return;
     this.jobs.set(job.id, job);
     onceReleased(this.list, () => this.draw());
-    if (job.state === before || job.state === "queued" || job.state === "running") return;
+    if (isGoing(job)) return;
     if (job.state === "failed" && this.listed(job)) note(job.text, "error");
     this.ended(job);
   }
 
   draw(): void {
-    const shown = [...this.jobs.values()].filter(this.listed).slice(-SHOWN).reverse();
+    const all = [...this.jobs.values()].filter(this.listed);
+    const shown = all.filter((job, i) => isGoing(job) || i >= all.length - SHOWN).reverse();
     this.element.hidden = !shown.length;
     const elements = shown.map((job) => this.line(job));
     const known = new Set(shown.map((job) => job.id));
@@ -96,7 +106,7 @@ export class JobList {
   }
 
   private parts(job: Job, bar: HTMLProgressElement): (HTMLElement | null)[] {
-    const going = job.state === "running" || job.state === "queued";
+    const going = isGoing(job);
     const cancel = (): void => void tried(() => send("DELETE", `jobs/${job.id}`, undefined));
     const view = job.state === "done" ? viewOf(job.kind, job.output) : null;
     const outside = view !== null && !view.startsWith("#");
@@ -104,7 +114,7 @@ export class JobList {
     const failed = job.state === "failed" || job.state === "interrupted";
     return [
       h("span", { class: "what" }, `${NAMES[job.kind] ?? job.kind}: ${job.title} → `, output),
-      going ? bar : h("span", { class: `state ${job.state}` }, job.state),
+      job.state === "running" ? bar : h("span", { class: `state ${job.state}` }, job.state === "queued" ? "waits for the one before" : job.state),
       going ? h("button", { type: "button", "data-key": `cancel ${job.id}`, click: cancel }, "Cancel") : null,
       !going && job.text ? h("details", { open: failed }, h("summary", {}, failed ? "Why" : "Summary"), h("pre", { tabindex: "0", class: failed ? "prose" : null }, job.text)) : null,
       h("details", {}, h("summary", {}, "Command line"), commandLine(job.command)),

@@ -72,16 +72,20 @@ export class LogPage {
 
   private async open(): Promise<void> {
     await this.reload();
-    for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) if (this.items.some((item) => item.path === job.output)) this.keep(job);
+    let last: Job | undefined; // estimate of this log: with its vehicle and profile one goes on
+    for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) {
+      if (this.items.some((item) => item.path === job.output) && this.keep(job) && job.kind === "estimate") last = job;
+    }
+    const used = (option: string): string => (last?.words.includes(option) ? (last.words[last.words.indexOf(option) + 1] ?? "") : "");
     this.jobs.draw();
     this.methods = await tried(() => get<Methods>("methods"));
-    const first = this.of("profile");
-    const named = `${stemOf(this.log)}-profile.yaml`;
-    this.profile = first.includes(named) ? named : "";
-    this.vehicle ||= this.onlyVehicle();
+    const own = last ? used("--profile") : `${stemOf(this.log)}-profile.yaml`;
+    this.profile = this.of("profile").includes(own) ? own : "";
+    this.vehicle = this.of("vehicle").includes(used("--vehicle")) ? used("--vehicle") : this.onlyVehicle();
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
     this.drawColumns(false); // that the log is read: a long one takes a while
-    this.look = await this.mapping.open(freeName(this.items, `${stemOf(this.log)}-profile`, ".yaml"));
+    this.look = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"));
+    if (this.look?.fitting.includes(own)) this.profile = own;
     this.drawColumns(!this.profile && !this.look?.ready);
     this.drawMachine();
     this.drawEstimate();
@@ -145,7 +149,7 @@ export class LogPage {
       this.vehicle = select.value;
       void this.parts().then(() => this.inspect());
     });
-    const maker = (this.maker = new MachineMaker(freeName(this.items, `${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
+    const maker = (this.maker = new MachineMaker(this.free(`${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
     const command = h("div");
     maker.element.addEventListener("kept", (event) => fill(command, h("details", {}, h("summary", {}, "Command line that makes this vehicle file"), (event as CustomEvent<HTMLElement>).detail)));
     refill(this.machine, [
@@ -180,7 +184,7 @@ export class LogPage {
       limits();
       void this.inspect();
     });
-    const output = h("input", { type: "text", id: "wizard-output", value: freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet"), required: true });
+    const output = h("input", { type: "text", id: "wizard-output", value: this.free(`${stemOf(this.log)}-estimates`, ".parquet"), required: true });
     const go = h("button", { type: "submit", class: "primary", id: "wizard-go", disabled: true }, "Estimate");
     const form = h(
       "form",
@@ -250,7 +254,20 @@ export class LogPage {
   private async queue(kind: string, wanted: Record<string, unknown>, output: string): Promise<void> {
     const replace = this.items.some((item) => item.path === output);
     if (replace && !confirm(`Replace ${output}?`)) return;
-    await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }));
+    const job = await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }));
+    if (!job) return;
+    this.jobs.update(job);
+    if (kind === "estimate") this.proposeOutput();
+  }
+
+  /** A name for a new file: neither of the folder, nor what a job will write. */
+  private free(name: string, ending: string): string {
+    return freeName([...this.items, ...this.jobs.pending], name, ending);
+  }
+
+  private proposeOutput(): void {
+    const output = document.getElementById("wizard-output") as HTMLInputElement | null;
+    if (output) output.value = this.free(`${stemOf(this.log)}-estimates`, ".parquet");
   }
 
   /** As `drawNext`, of the estimates as they are now. */
@@ -284,12 +301,12 @@ export class LogPage {
         h("li", {}, h("a", { href: viewOf("estimates", this.estimates), id: "see-estimate" }, `See the drive: ${this.estimates}`)),
         ...(this.hasAdhesion
           ? [
-              button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, freeName(this.items, `${stem}-soils`, ".json"))),
+              button("soils", "Learn the curve", () => void this.queue("soils", { ...runs, soil: soil.value.trim() || null }, this.free(`${stem}-soils`, ".json"))),
               h("li", { class: "of" }, h("label", { for: soil.id }, "for the ground named"), soil),
-              button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, freeName(this.items, `${stem}-ground`, ".json"))),
+              button("ground", "Find changes of the ground", () => void this.queue("ground", { ...runs, library }, this.free(`${stem}-ground`, ".json"))),
             ]
           : [h("li", { class: "hint", id: "no-adhesion" }, "The log has no torque, so there is slip and no adhesion: no curve can be learned, and no change of the ground be found.")]),
-        button("report", "Write the report", () => void this.queue("report", { ...runs, library, ground }, freeName(this.items, `${stem}-report`, ".html"))),
+        button("report", "Write the report", () => void this.queue("report", { ...runs, library, ground }, this.free(`${stem}-report`, ".html"))),
       ),
     ]);
   }
@@ -304,7 +321,7 @@ export class LogPage {
     if (job.state !== "done") return false;
     if (job.kind === "estimate" && job.title === this.log) {
       this.estimates = job.output;
-      this.vehicle ||= this.of("vehicle").find((path) => job.words[job.words.indexOf("--vehicle") + 1] === path) ?? "";
+      this.made.clear(); // of the estimates before, perhaps by another vehicle
     } else if (job.words.includes(this.estimates)) this.made.set(job.kind, job.output);
     else return false;
     return true;
@@ -314,8 +331,7 @@ export class LogPage {
     await this.reload();
     if (!this.keep(job)) return;
     await this.offerNext();
-    const output = document.getElementById("wizard-output") as HTMLInputElement | null;
-    if (output) output.value = freeName(this.items, `${stemOf(this.log)}-estimates`, ".parquet");
+    this.proposeOutput();
   }
 }
 

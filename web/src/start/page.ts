@@ -139,7 +139,7 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
   function begin(command: string, of: Item[]): void {
     const files = chosen(of);
     if (command === "batch" && files.length === 1) location.hash = pageOf(files[0] as string);
-    else ask(dialog, command, files, items);
+    else ask(dialog, command, files, [...items, ...jobs.pending], (job) => jobs.update(job));
   }
 
   function tick(item: Item): HTMLElement {

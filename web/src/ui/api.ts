@@ -22,6 +22,18 @@ export interface Job {
   command: string;
 }
 
+const ORDER = ["queued", "running"];
+
+/** Whether a job waits or runs. */
+export function isGoing({ state }: Job): boolean {
+  return ORDER.includes(state);
+}
+
+/** Whether what is told of a job is older than what is known: answers and notices overtake each other, and what has ended stays so. */
+export function isOlder(told: Job, known: Job): boolean {
+  return !isGoing(known) || (isGoing(told) && ORDER.indexOf(told.state) < ORDER.indexOf(known.state));
+}
+
 export type Query = Record<string, string | number | boolean | undefined>;
 
 export function address(path: string, query: Query = {}): string {
