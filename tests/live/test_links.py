@@ -229,6 +229,31 @@ async def test_foxglove_subscribes_and_an_mcap_holds_the_same(tmp_path, vehicle,
     assert 0 < readable_messages(cut) < readable_messages(path)
 
 
+async def test_an_mcap_that_cannot_be_written_any_more_ends_neither_the_estimates_nor_foxgloves_stream(
+    tmp_path, vehicle, short, port, sender, monkeypatch
+):
+    class Full:
+        def flush(self):
+            raise RuntimeError("No space left on device")
+
+        close = flush
+
+    monkeypatch.setattr("terragrip.live.sinks.foxglove._FLUSH", -1.0)
+    monkeypatch.setattr("terragrip.live.sinks.foxglove._AGAIN", 0.1)
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"foxglove://127.0.0.1:{port}?mcap={tmp_path}"])
+    sent = messages(short.recording, 40)
+    async with running(service):
+        sender.send(*sent[:20])
+        await until(lambda: len(list(tmp_path.iterdir())) == 1)
+        service.sinks[0][1]._writer = Full()
+        sender.send(*sent[20:])
+        await until(lambda: events(service, "sink_back"))
+        assert not service.task.done()
+    assert "is the disk full? (No space left on device); all else goes on" in events(service, "sink_lost")[0]
+    assert len(list(tmp_path.iterdir())) == 2
+    assert service.core.rows == 40
+
+
 def readable_messages(path) -> int:
     result = 0
     with path.open("rb") as stream, contextlib.suppress(EndOfFile):

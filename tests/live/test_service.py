@@ -224,7 +224,7 @@ async def test_another_set_of_fields_is_named_and_survived(vehicle, short, port,
     assert events(service, "schema") == [
         "messages changed: without drive_torque_fl and with torque_front_left"
     ]
-    assert events(service, "channel_lost") == ["drive_torque_fl no longer comes"]
+    assert events(service, "channel_lost") == ["drive_torque_fl comes no longer"]
 
 
 async def test_where_estimates_cannot_keep_up_drops_are_counted(vehicle, short):

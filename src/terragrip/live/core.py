@@ -25,6 +25,8 @@ from terragrip.live.counts import Counts
 from terragrip.live.outputs import Event, Output, Refusal, Row, Values, of_ground
 from terragrip.live.reorder import Pending, Reorder
 from terragrip.recording.checks import NOTHING_TOWED
+from terragrip.recording.clock import clock_text
+from terragrip.recording.columns import SINCE_1970
 
 if TYPE_CHECKING:
     from terragrip.ground.live import LiveGround
@@ -119,6 +121,11 @@ class Core:
     def time(self) -> float:
         """Instant [s] of the last row; -inf before the first."""
         return self.reorder.released
+
+    @property
+    def when(self) -> str:
+        """`time` in words: a date where it counts from 1970."""
+        return clock_text(round(self.time, 3)) if self.time > SINCE_1970 else f"{self.time:.6g} s"
 
     def handle(self, kind: str, content: Any) -> list[Output]:
         """An input as the record holds it: ``S`` a sample, ``T`` a tick, ``N`` a note, ``F`` a flush; another is none."""

@@ -97,7 +97,7 @@ class Pipeline:
         try:
             keep(self.recorder)
         except OSError as error:
-            self.failure = f"the record stopped at {self.core.time:.6g} s ({error.strerror or error})"
+            self.failure = f"the record stopped at {self.core.when} ({error.strerror or error})"
             self.recorder.abandon()
             self.recorder = None
             return [*outputs, Event(self.core.time, "record_failed", "record", self.failure)]

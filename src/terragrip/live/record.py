@@ -106,7 +106,7 @@ class Recorder:
                     ahead = WriteAhead(path, append_at=reading.good)
         self._ahead = self._open_wal() if ahead is None else ahead
         if self.core.rows:
-            text = f"resumed after {self.core.rows} rows, the last at {self.core.time:.6g} s"
+            text = f"resumed after {self.core.rows} rows, the last at {self.core.when}"
             if torn:
                 text += f"; the last {torn} bytes were incomplete and are left out"
             note = {"event": {"time": None, "kind": "resumed", "source": "record", "text": text}}

@@ -198,29 +198,29 @@ class Reorder:
         del self.pending[0]
         self.released = row.time
         self._recent.append((row.time, row.parts[0][1] if len(row.parts) == 1 else tuple(row.values)))
+        holes = []
         for stream in present:
-            if stream.overdue:
-                if stream.overdue >= LOST:
-                    self.changes += [
-                        ("channel_back", stream.source, f"{name} is back") for name in stream.channels
-                    ]
-                stream.overdue = 0
-            self._step(stream, row.time)
+            if stream.overdue >= LOST:
+                self._report("channel_back", stream, "again")
+            stream.overdue = 0
+            holes.append(self._step(stream, row.time))
         if expired:
-            self._give_up(row.time, absent)
+            self._give_up(row.time, absent, is_hole=bool(holes) and all(holes))
         if not known:
             self._begin(row, {(stream.source, name) for stream in present for name in stream.channels})
         return row
 
-    def _step(self, stream: Stream, time: float) -> None:
+    def _step(self, stream: Stream, time: float) -> int:
         missing = stream.step_to(time)
         if missing:
             self.counts.add("missing", stream.channels, missing)
             if missing >= _LONG and stream.holes == BUNDLES and stream.count <= BUNDLES * _LARGEST:
-                text = (
-                    f"{', '.join(stream.channels)}: samples come in bundles, stamped as these arrive: {_HOW}"
-                )
-                self.changes.append(("late", stream.source, text))
+                self._report("late", stream, f"in bundles, stamped as these arrive: {_HOW}")
+        return missing
+
+    def _report(self, kind: str, stream: Stream, how: str) -> None:
+        come = "comes" if len(stream.channels) == 1 else "come"
+        self.changes.append((kind, stream.source, f"{', '.join(stream.channels)} {come} {how}"))
 
     def _begin(self, row: Pending, old: Collection[tuple[int, str]]) -> None:
         """Begin a stream for each source's channels that no stream holds yet."""
@@ -230,17 +230,20 @@ class Reorder:
                 self.streams.append(Stream(source, new, row.time, row.time, row.time))
         self._layouts.clear()
 
-    def _give_up(self, time: float, absent: list[Stream]) -> None:
-        """Streams that were due and did not come in time are not waited for at this instant again."""
+    def _give_up(self, time: float, absent: list[Stream], is_hole: bool) -> None:
+        """Streams that were due and did not come in time are not waited for at this instant again.
+
+        ``is_hole``: nothing came before this row, of its own streams neither; so no stream is to blame for more than this instant.
+        """
         for stream in absent:
             if stream.period == 0.0 or not stream.awaited(time, present=False):
                 continue
+            if is_hole:
+                stream.due_from, stream.calm = time - stream.period, time + 0.5 * stream.period
             while stream.due_from + stream.period - stream.tolerance <= time and stream.overdue < LOST:
                 stream.give_up()
             if stream.overdue >= LOST:
-                self.changes += [
-                    ("channel_lost", stream.source, f"{name} no longer comes") for name in stream.channels
-                ]
+                self._report("channel_lost", stream, "no longer")
 
     def flush(self) -> list[Pending]:
         """All that is left, in order: the source has ended."""

@@ -12,8 +12,6 @@ from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
 from terragrip.live.outputs import Event, Ground, Row
 from terragrip.live.pulse import Pulse
-from terragrip.recording.clock import clock_text
-from terragrip.recording.columns import SINCE_1970
 
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
@@ -153,8 +151,7 @@ class Statistics:
     def summary(self) -> str:
         """The run in a few lines of text."""
         core = self._core
-        last = clock_text(round(core.time, 3)) if core.time > SINCE_1970 else f"{core.time:.6g} s"
-        lines = [f"{core.rows} rows estimated" + (f", up to {last}" if core.rows else "")]
+        lines = [f"{core.rows} rows estimated" + (f", up to {core.when}" if core.rows else "")]
         if core.rows and not any(name.startswith(_TURNING) for name in core.counts.by_channel):
             lines.append("no wheel's speed came: there is no slip or traction in these rows")
         for fate in ("missing", "late", "doubled", "dropped", "unreadable", "clock"):

@@ -85,7 +85,7 @@ def head(service: Service) -> list[str]:
     s, core = service.statistics, service.core
     delay = f"delay {1e3 * s.delay:.1f} ms   " if service.is_real_time else ""
     lines = [
-        f"time {core.time:.1f} s   {s.row_rate:.0f} rows/s   {s.sample_rate:.0f} samples/s   "
+        f"{core.when}   {s.row_rate:.0f} rows/s   {s.sample_rate:.0f} samples/s   "
         f"{delay}{len(service.inbox.samples)} waiting   {core.rows} rows"
         if core.rows else "waiting for the first sample"
     ]  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 _FLUSH = 1.0  # s
 _CHUNK = 1 << 16  # bytes: what a kill can cost a file
 _SEGMENT = 600.0  # s in one MCAP file
+_AGAIN = 30.0  # s until another is tried
 
 
 class FoxgloveSink:
@@ -30,6 +33,7 @@ class FoxgloveSink:
     def __init__(self, uri: Uri, vehicle: Vehicle, columns: Sequence[str]) -> None:
         import foxglove
 
+        logging.getLogger("foxglove.log_sink_set").setLevel(logging.ERROR)  # of a full disk: a line a message
         self.uri, self._vehicle = uri, vehicle
         if not is_loopback(uri.host):
             raise InputError(
@@ -71,42 +75,52 @@ class FoxgloveSink:
                 self._log(await outbox.get(), outbox)
         finally:
             server.stop()
-            if self._writer is not None:
-                self._writer.close()
-                self._writer = None
+            with contextlib.suppress(RuntimeError):  # the file ends as after a kill
+                self._close()
 
     def _log(self, message: Message, outbox: Outbox) -> None:
-        self._rotate()
+        if self._folder is not None:
+            self._rotate(self._folder, outbox)
         if message.row is not None:
             self._arrival = message.row.arrival
         at = max(0, round(1e9 * self._arrival))
         self._channels[message.kind].log(message.json(outbox.columns), log_time=at)
 
-    def _rotate(self) -> None:
-        """Open, flush or change the MCAP file as time goes."""
-        if self._folder is None:
-            return
-        import foxglove
-        from foxglove.mcap import MCAPWriteOptions
-
+    def _rotate(self, folder: Path, outbox: Outbox) -> None:
+        """Open, flush or change the MCAP file as time goes; where the disk is full go on without, and try again later."""
         now = time.monotonic()
         try:
-            if self._writer is None or now - self._began > _SEGMENT:
-                if self._writer is not None:
-                    self._writer.close()
-                self._folder.mkdir(parents=True, exist_ok=True)
-                number = 1 + max(
-                    (int(p.stem[10:]) for p in self._folder.glob("terragrip-??????.mcap")), default=0
-                )
-                self._writer = foxglove.open_mcap(
-                    self._folder / f"terragrip-{number:06d}.mcap",
-                    context=self._context,
-                    writer_options=MCAPWriteOptions(chunk_size=_CHUNK),
-                )
+            if self._writer is not None and now - self._began > _SEGMENT:
+                self._close()
+            if self._writer is None and now >= self._began:
+                self._open(folder)
                 self._began = self._flushed = now
-            elif now - self._flushed > _FLUSH:
+                outbox.connected()
+            elif self._writer is not None and now - self._flushed > _FLUSH:
                 self._writer.flush()
                 self._flushed = now
         except (OSError, RuntimeError, ValueError) as error:
-            self._writer = None
-            raise unwritable(self._folder, error, "free space or choose another folder") from error
+            if not self._began:
+                raise unwritable(folder, error, "free space or choose another folder") from error
+            self._began = now + _AGAIN
+            with contextlib.suppress(RuntimeError):
+                self._close()
+            outbox.lost(f"no MCAP is written, is the disk full? ({error}); all else goes on")
+
+    def _open(self, folder: Path) -> None:
+        import foxglove
+        from foxglove.mcap import MCAPWriteOptions
+
+        folder.mkdir(parents=True, exist_ok=True)
+        number = 1 + max((int(p.stem[10:]) for p in folder.glob("terragrip-??????.mcap")), default=0)
+        self._writer = foxglove.open_mcap(
+            folder / f"terragrip-{number:06d}.mcap",
+            context=self._context,
+            writer_options=MCAPWriteOptions(chunk_size=_CHUNK),
+        )
+
+    def _close(self) -> None:
+        """Let go of the file; raises RuntimeError where its end cannot be written."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
