@@ -29,6 +29,11 @@ LATEST = 2.0
 """Seconds by which positions are looked for behind the wheels at most."""
 LEAST_STEPS = 12
 """Different positions along an axis, less one, that show to which step they are rounded."""
+FROZEN = 1.0 / 3.0
+"""Of the way driven over three stretches, one after the other: positions that move less stand still, though they tremble ..."""
+FROZEN_WAY = 1.0
+"""... each of so many metres, or eight times the positions' scatter (a turn is shorter than three), driven at `FROZEN` of the usual speed:
+the way of a machine that is stuck is noise."""
 LEAST_FIXES = 5
 """Fixes between two jumps or outages; fewer are taken for strays."""
 TURNED = np.radians(25.0)
@@ -103,7 +108,8 @@ def places_of(estimates: Estimates, epsg: int, datum: str = "EPSG:4326", file: s
     driven = np.diff(np.interp(when, estimates.time, way))
     excess = np.hypot(np.diff(east), np.diff(north)) - driven
     usual = _scatter(excess)
-    piece, cut = _pieces(when, driven, excess, usual)
+    frozen = _frozen(when, east, north, driven, usual)
+    piece, cut = _pieces(when, driven, excess, usual, frozen)
     notes += cut
     x, y = _between(estimates.time, when, east, piece), _between(estimates.time, when, north, piece)
     heading = _heading(x, y, way, _base(vehicle), np.nan_to_num(estimates["ground_speed"]))
@@ -182,20 +188,42 @@ def _step(latitude: Floats, longitude: Floats) -> float:
     return max(float(gap.min()) if len(gap) >= LEAST_STEPS else 0.0 for gap in gaps)
 
 
-def _pieces(time: Floats, driven: Floats, excess: Floats, usual: float) -> tuple[Ints, tuple[str, ...]]:
+def _frozen(time: Floats, east: Floats, north: Floats, driven: Floats, usual: float) -> Bools:
+    """The fixes (n,) that stand still while the vehicle drives ``driven`` (n - 1,) [m]; ``usual`` [m] is their scatter."""
+    way, last = np.r_[0.0, np.cumsum(driven)], len(driven)
+    stretch = max(FROZEN_WAY, 8.0 * usual)
+    end = np.searchsorted(way, way + stretch)
+    there = end <= last
+    end = np.minimum(end, last)
+    quick = stretch / np.maximum(time[end] - time, 1e-9)
+    still = there & (np.hypot(east[end] - east, north[end] - north) < FROZEN * (way[end] - way))
+    still &= quick > FROZEN * np.median(np.interp(np.linspace(0, way[-1], 1000), way, quick))
+    first = np.flatnonzero(still & still[end] & still[end[end]])
+    change = np.bincount(first, minlength=last + 2) - np.bincount(end[end[end[first]]], minlength=last + 2)
+    return np.asarray(np.cumsum(change[: last + 1]) > 0)
+
+
+def _pieces(
+    time: Floats, driven: Floats, excess: Floats, usual: float, frozen: Bools
+) -> tuple[Ints, tuple[str, ...]]:
     """The number of the unbroken piece of each fix (n,), -1 for strays; sentences on removed positions.
 
-    Of the steps (n - 1,) the way ``driven`` and the ``excess`` of the positions over it [m], with its ``usual`` scatter.
+    Of the steps (n - 1,) the way ``driven`` and the ``excess`` of the positions over it [m], with its ``usual`` scatter; ``frozen`` (n,).
     """
     if len(time) < 2:
         return np.full(len(time), -1), ("There are fewer than two positions.",)
     wait = np.diff(time)
     jump = np.abs(excess - np.median(excess)) > JUMP + 8 * usual + JUMP_SHARE * driven
     outage = (wait > max(OUTAGE_TIME, 5 * float(np.median(wait)))) & (driven > OUTAGE_WAY)
-    piece = np.r_[0, np.cumsum(jump | outage)]
+    piece = np.r_[0, np.cumsum(jump | outage | (frozen[1:] != frozen[:-1]))]
     count = np.bincount(piece)
-    stray = (count < LEAST_FIXES)[piece]
+    stray = (count < LEAST_FIXES)[piece] | frozen
     notes = []
+    if frozen.any():
+        notes.append(
+            f"Positions that stand still while the wheels drive {driven[frozen[:-1]].sum():.0f} m, the first at "
+            f"{time[frozen][0]:.1f} s, left empty."
+        )
     if outage.any():
         notes.append(
             f"{counted(outage, 'outage')} of the positions, {driven[outage].sum():.0f} m of way, left empty."
