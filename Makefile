@@ -161,7 +161,7 @@ $(VENV)/package: $(VENV)/runtime $(BUILD_INPUTS)
 	@touch $@
 
 # --- the kernel's own tests, in double and in single precision ---------------------------------------------------------
-KERNEL_FLAGS := -std=c99 -O2 -Wno-psabi -Wall -Wextra -pedantic -Werror -Ikernel/include -Ikernel/src -Ikernel/tests
+KERNEL_FLAGS := -std=c99 -O2 -Wno-psabi -Wall -Wextra -pedantic -Wconversion -Wdouble-promotion -Wshadow -Werror -Ikernel/include -Ikernel/src -Ikernel/tests
 
 define kernel_rules
 build/kernel/$(1)/%.o: kernel/src/%.c $$(KERNEL_HEADERS) Makefile

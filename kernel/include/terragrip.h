@@ -467,7 +467,7 @@ typedef struct { /* sensitivities to ln a_j, one lane a parameter */
     tg_real dx[TG_MAX_STATES * TG_ROWS]; /* state by parameter, `stride` apart */
     tg_real dP[TG_PAIRS * TG_ROWS];      /* the triangle row >= column, row by row, by parameter */
     tg_real C[TG_MAX_WHEELS + 1][TG_MAX_WHEELS + 1]; /* mean product of the whitened innovations; I at first */
-    int32_t updates;                     /* with every wheel and ground speed */
+    int32_t updates;                     /* with every wheel and ground speed, since the last step of A */
 } tg_adaptation_state;
 
 typedef struct {

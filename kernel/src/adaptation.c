@@ -188,8 +188,10 @@ static void copy(tg_adaptation_state *to, const tg_adaptation_state *from, int r
 TG_INLINE int adapt(tg_adaptation_state *s, const tg_filter *f, const tgi_plan *plan, const tgi_result *result, const int n, const int stride)
 {
     sensitivity_predict(s, f, plan, n, stride);
-    if (result->used && remember_innovations(s, f, plan, result) == n + 1 && ++s->updates % f->tuning.stride == 0)
+    if (result->used && remember_innovations(s, f, plan, result) == n + 1 && ++s->updates >= f->tuning.stride) {
         descend(s, f, result, n, stride);
+        s->updates = 0;
+    }
     for (int c = 0; c < result->used; c++) sensitivity_update(s, plan, result, c, n, stride);
     return is_finite(s, n, stride);
 }

@@ -75,14 +75,13 @@ void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d)
 
 void tgi_bank_init(tg_filter *f)
 {
-    tgi_modes m;
+    tg_bank_state *const b = &f->policy.bank;
     for (int k = 0; k < f->states; k++) {
-        m.x[k] = lanes_all(f->x[k]);
-        m.d[k] = lanes_all(f->d[k]);
-        for (int i = 0; i <= k; i++) m.u[k][i] = lanes_all(f->u[k * f->stride + i]);
+        lanes_store(b->x[k], lanes_all(f->x[k]));
+        lanes_store(b->d[k], lanes_all(f->d[k]));
+        for (int i = 0; i <= k; i++) lanes_store(b->u[k][i], lanes_all(f->u[k * f->stride + i]));
     }
-    store(f, &m);
-    for (int b = 0; b < TG_MODES; b++) f->policy.bank.probability[b] = (tg_real)1 / TG_MODES;
+    lanes_store(b->probability, lanes_all((tg_real)1 / TG_MODES));
 }
 
 /* Each mode starts from the mixture of all, given itself. The mixture's own mean and covariance stay. */
@@ -104,7 +103,8 @@ static void mix(const tg_filter *f, tgi_modes *m, tg_lanes *probability, array *
     bank_factor(a, rows, 2 * all, all, NULL, m->u, m->d);
 }
 
-TG_INLINE void bank_predict(const tgi_plan *plan, const tgi_modes *m, array *a, tg_lanes *x, const int n)
+/* The means in place, the factors as an array. */
+TG_INLINE void bank_predict(const tgi_plan *plan, tgi_modes *m, array *a, const int n)
 {
     for (int k = 0; k < TG_TWICE(n); k++) {
         tg_lanes from[TG_MAX_STATES], to[TG_MAX_STATES];
@@ -113,7 +113,7 @@ TG_INLINE void bank_predict(const tgi_plan *plan, const tgi_modes *m, array *a, 
         for (int i = 0; i < TG_TWICE(n); i++) a->W[i][k] = to[i];
         a->weight[k] = m->d[k];
     }
-    bank_move(plan, m->x, x, n);
+    bank_move(plan, m->x, n);
 }
 
 /* Prior variances of the channels, of each mode. */
@@ -269,15 +269,14 @@ static void report(const tg_filter *f, const tgi_plan *plan, const tgi_update *o
 TG_INLINE void work_out(const tg_filter *f, const tgi_plan *plan, int mixes, const tg_lanes *noise, tgi_update *out, const int n)
 {
     array a;
-    tgi_modes before;
     tg_lanes S[TG_MAX_CHANNELS];
-    load(f, &before);
+    load(f, &out->state);
     out->probability = lanes_load(f->policy.bank.probability);
     out->used = 0;
     out->nis = lanes_all(0);
     out->volume = lanes_all(1);
-    if (mixes) mix(f, &before, &out->probability, &a);
-    bank_predict(plan, &before, &a, out->state.x, n);
+    if (mixes) mix(f, &out->state, &out->probability, &a);
+    bank_predict(plan, &out->state, &a, n);
     for (int j = 0; j < TG_TWICE(n); j++) out->x_prior[j] = bank_mean(out->probability, out->state.x[j]);
     if (plan->count) {
         bank_variances(plan, &a, noise, S, n);

@@ -44,7 +44,7 @@ TG_INLINE tg_lanes bank_mix_mean(const tg_lanes *share, tg_lanes x, tg_lanes *aw
     return mixed;
 }
 
-/* The affine map on one vector a mode: a column of factors, or the means. */
+/* The affine map on one vector a mode: a column of factors, or the means; `to` may be `from`. */
 TG_INLINE void bank_map(const tg_passage *p, const tg_lanes *from, tg_lanes *to, const int n)
 {
     tg_lanes v = from[n + 1] - p->g * from[n];
@@ -55,11 +55,11 @@ TG_INLINE void bank_map(const tg_passage *p, const tg_lanes *from, tg_lanes *to,
         to[n + 2 + i] = p->phi[i] * from[n + 2 + i] + p->b[i] * from[i];
 }
 
-/* Predicted means. */
-TG_INLINE void bank_move(const tgi_plan *plan, const tg_lanes *from, tg_lanes *to, const int n)
+/* Means to predicted means. */
+TG_INLINE void bank_move(const tgi_plan *plan, tg_lanes *x, const int n)
 {
-    bank_map(&plan->passage, from, to, n);
-    for (int i = n + 1; i < TG_TWICE(n); i++) to[i] += plan->shift[i];
+    bank_map(&plan->passage, x, x, n);
+    for (int i = n + 1; i < TG_TWICE(n); i++) x[i] += plan->shift[i];
 }
 
 /* Innovations of the mixture and their variances, and the weights, before any update. S: each mode's own variances. */

@@ -34,8 +34,7 @@ static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_m
 {
     const tg_settings *s = &e->settings;
     tg_real largest = 0, gain[TG_MAX_WHEELS];
-    for (int32_t k = 0; k < s->axles; k++)
-        if (tgi_fabs(s->load_transfer[k]) > largest) largest = tgi_fabs(s->load_transfer[k]);
+    for (int32_t a = 0; a < s->axles; a++) largest = tgi_max(largest, tgi_fabs(s->load_transfer[a]));
     if (!(largest > 0)) return;
     const tg_real share = s->uncertainty.vertical_load * weight / ((tg_real)s->axles * largest);
     const tg_real pull = pull_is_unseen(s) ? mu[s->machine.wheels] * weight * s->hitch_height : 0;

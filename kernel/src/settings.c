@@ -319,20 +319,15 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     if (!e || !settings) return TG_BAD_ARGUMENT;
     tg_status status = check(settings);
     if (status != TG_OK) return status;
-    tg_filter filter;
-    tg_consider consider;
-    memset(&filter, 0, sizeof filter);
-    memset(&consider, 0, sizeof consider);
-    status = tgi_filter_anew(&filter, &consider, settings);
+    status = tgi_filter_anew(&e->filter, &e->consider, settings); /* which changes nothing where it fails */
     if (status != TG_OK) return status;
-    memset(e, 0, tg_estimator_size(settings->tuning.policy));
+    memset(e, 0, offsetof(tg_estimator, consider));
+    e->track = NULL;
     e->settings = *settings;
     if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
-    memcpy(&e->filter, &filter, tg_filter_size(settings->tuning.policy));
-    memcpy(&e->consider, &consider, sizeof consider);
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
-    e->yaw_time = -INFINITY;
+    e->yaw_time = -(double)INFINITY;
     work_out_constants(settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);

@@ -115,7 +115,7 @@ static void leave_open(const tgi_scene *scene, int32_t n, tg_real *o)
 {
     const int32_t undefined[] = {TG_OUT_SLIP, TG_OUT_SLIP_STD, TG_OUT_EFFICIENCY, TG_OUT_EFFICIENCY_STD};
     for (int32_t k = 0; k < 4; k++) blank(o, undefined[k], n);
-    if (scene->seen_motion) return;
+    if (scene->seen_motion > 0) return;
     blank(o, TG_OUT_GROUND_SPEED, 2);
     blank(o, TG_OUT_WHEEL_SPEED, n);
     blank(o, TG_OUT_WHEEL_SPEED_STD, n);
@@ -151,5 +151,5 @@ void tgi_traction(const tg_settings *restrict s, const tg_real *restrict warp, c
         for (int32_t i = 0; i < n; i++) o[TG_OUT_WHEEL_SPEED + i] = -o[TG_OUT_WHEEL_SPEED + i];
     }
     if (scene->any_silent > 0) leave_unknown(scene, n, o);
-    if (scene->standing || !scene->seen_motion) leave_open(scene, n, o);
+    if (scene->standing > 0 || !(scene->seen_motion > 0)) leave_open(scene, n, o);
 }

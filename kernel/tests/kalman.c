@@ -54,7 +54,7 @@ static double one_problem(int n, int engine, double huber, double missing, int s
                 const double S = (double)step.innovation_variance[c], w = (double)step.weight[c];
                 worst = fmax(worst, fabs((double)(step.innovation[c] - d.nu[a])) / sqrt(S) / 30);
                 worst = fmax(worst, fabs((double)(w - d.weight[a])));
-                worst = fmax(worst, fabs((double)(S - r[c] + r[c] / w - d.S[a][a]) / (double)d.S[a][a]));
+                worst = fmax(worst, (double)fabsl((S - (wide)r[c] + (wide)r[c] / w - d.S[a][a]) / d.S[a][a]));
             }
         }
         if (k % 40 == 39) {

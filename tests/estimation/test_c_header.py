@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 import subprocess
 import sysconfig
 from pathlib import Path
@@ -70,6 +71,21 @@ def test_the_same_digits(made: tuple[Path, tg.Estimates, tg.Recording]) -> None:
     for name in result.columns.drop(["time", "event"]):
         np.testing.assert_array_equal(result[name], estimates[name], name)
     assert [EVENTS[k] for k in result["event"]] == list(estimates["event"])
+
+
+def test_the_header_compiles_without_warnings_in_single_precision_and_in_cpp(
+    made: tuple[Path, tg.Estimates, tg.Recording],
+) -> None:
+    strict = shlex.split(
+        "-Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Werror -fsyntax-only -DTG_FLOAT"
+    )
+    source = made[0] / "in.c"
+    source.write_text(
+        '#include "terragrip_settings.h"\nint main(void) { return terragrip_settings.axles < 1; }\n'
+    )
+    for words in (["cc", "-std=c99", "-xc"], ["c++", "-std=c++17", "-xc++"]):
+        if shutil.which(words[0]):
+            subprocess.run([*words, *strict, f"-I{ROOT / 'kernel/include'}", str(source)], check=True)
 
 
 def test_estimates_that_need_more_than_the_kernel_are_refused(

@@ -73,6 +73,8 @@ def estimator_of(about: Mapping[str, Any], file: str) -> TractionEstimator:
 def c_header(estimator: TractionEstimator, origin: str) -> str:
     """C99 text that declares ``terragrip_settings``, a tg_settings, and the places of the columns in tg_sample and tg_estimate.
 
+    C++ may include it too, and either precision: no warning is given for what C++ before 20, or single precision, does with it.
+
     ``origin``: a line on where the settings come from.
     """
     engine = estimator.engine
@@ -84,6 +86,7 @@ def c_header(estimator: TractionEstimator, origin: str) -> str:
         "#define TERRAGRIP_SETTINGS_H",
         "#include <math.h>",
         '#include "terragrip.h"',
+        "#pragma GCC system_header /* rounding to tg_real, members left out (0) and C++ before 20 give no warnings */",
         "",
         "/* Where in tg_sample.value the sensors' values go, in SI units; NAN: not measured at that instant. */",
         *_places("IN", ins),
