@@ -205,9 +205,8 @@ def test_what_would_show_the_slip_of_most_power_was_not_driven_yet(slip, pulls):
     known = SimpleNamespace(net_traction=1.0, slip=0.05, interval=(0.04, 0.06))
     curves = SimpleNamespace(reach=0.06, over=SimpleNamespace(loss=lambda _: 0.0))
     power = SimpleNamespace(slip=slip, interval=(0.0, 0.6))
-    (said,) = [
-        one for one in _missing(known, power, curves, VEHICLE, measured=True) if "most pull power" in one
-    ]
+    missing = _missing(known, power, curves, VEHICLE, "the drive", measured=True)
+    (said,) = [one for one in missing if "most pull power" in one]
     assert said.endswith(f"a drive with pulls {pulls} would show it")
 
 

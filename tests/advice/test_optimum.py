@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
+from advice_drives import VEHICLE
 from terragrip.advice.optimum import GRID, best_of, over_slip
+from terragrip.advice.soil_curves import of_library
 from terragrip.physics.adhesion import CURVES, efficiency_peak
+from terragrip.soil.bins import BinSettings
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil
 
 
 def straight(slope: float, resistance: float, tire: float, driven: float = 1.0):
@@ -75,3 +80,22 @@ def test_the_loss_of_a_slip_is_what_nearly_all_curves_lose_there_at_most():
     k, r, t, s = 4.0, 0.06, 0.02, 0.3
     eta = (k * s - r) * (1 - s) / (k * s + t)
     assert curves.loss(s) == pytest.approx(best.efficiency - eta, abs=1e-4)
+
+
+@pytest.mark.parametrize("rate", [20.0, 34.0])
+def test_a_librarys_curve_that_ends_before_the_best_slip_tells_it_by_what_soils_do(rate):
+    """Other rises than the fit's, known closely to 5 % of slip: by the fit's own form the interval of the best slip held neither."""
+
+    def rise(slip):
+        return 0.6 * -np.expm1(-rate * slip)
+
+    rng = np.random.default_rng(8160003)
+    slip, run = rng.uniform(0.005, 0.05, 4000), np.repeat(np.arange(10), 400)
+    mu = rise(slip) + 0.02 * rng.standard_normal(4000)
+    fit = AdhesionCurve(bins=BinSettings(0.005, 0.005, 0.05, 20)).fit(slip, mu, run)
+    curves = of_library(Soil.from_curve("a", fit, "", (0.06, 0.01)), None, VEHICLE)
+    truth = over_slip(
+        rise(GRID)[None], 0.06 + 0.06 * (GRID[None] - 0.05), GRID, VEHICLE.tire_rolling_resistance
+    )
+    low, high = best_of(curves.over, curves.over.efficiency).interval
+    assert low <= best_of(truth, truth.efficiency).slip <= high

@@ -22,6 +22,9 @@ from terragrip.maps.layers import cell_table, layer
 from terragrip.maps.places import places_of, zone_of
 from terragrip.maps.values import _adhesion_constants, _resistance_constants, driven_slip
 from terragrip.physics.adhesion import CURVES
+from terragrip.soil.bins import BinSettings
+from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -49,6 +52,22 @@ def test_adhesion_far_from_the_slip_driven_says_that_the_curves_form_is_unknown(
         cells = map_of([("a", firm)], MapSettings(reference_slip=at)).cells["adhesion"]
         assert np.all(np.abs(cells.value - float(curve.value(at, {}))) < 2 * cells.std + 0.01)
         assert np.all(cells.constant >= far * cells.value)
+
+
+def test_a_librarys_curve_is_not_sure_of_slips_beyond_its_data() -> None:
+    """Burckhardt's wet asphalt, known to 4 % of slip as the paper's form, and mapped at 20 %, where it has half of that form's adhesion."""
+    firm, curve = drive(*lanes(2, 30, 3), slip=0.04), CURVES["burckhardt"]
+    given = {"c1": 0.857, "c2": 33.8, "c3": 0.347}
+    for wheel in firm.wheels:
+        firm.columns[f"adhesion_{wheel}"] = np.full(len(firm), float(curve.value(0.04, given)))
+    firm.labels["soil"] = np.full(len(firm), "road", dtype=object)
+    slip, run = np.tile(np.linspace(0.005, 0.04, 500), 6), np.repeat(np.arange(6), 500)
+    fit = AdhesionCurve(bins=BinSettings(0.005, 0.005, 0.045)).fit(
+        slip, curve.value(slip, given) * (1 + 0.02 * np.sin(run)), run
+    )
+    library = SoilLibrary({"road": Soil.from_curve("road", fit)})
+    cells = map_of([("a", firm)], MapSettings(reference_slip=0.2), library=library).cells["adhesion"]
+    assert np.all(np.abs(cells.value - float(curve.value(0.2, given))) < 2.5 * cells.std)
 
 
 @pytest.mark.parametrize("until", [0.3, 1.0])

@@ -166,7 +166,7 @@ def test_a_library_is_shown_as_it_was_learned(curves: list[SoilCurves], tmp_path
     for mine, theirs in zip(shown, fresh, strict=True):
         grid = np.linspace(0.05, 0.6, 12)
         assert np.array_equal(mine.learned.curve.predict(grid), theirs.learned.curve.predict(grid))
-        assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), rtol=1e-9)
+        assert np.allclose(mine.learned.curve.band(grid), theirs.learned.curve.band(grid), atol=1e-5)
         assert mine.learned.curve.bins_.to_list() == theirs.learned.curve.bins_.to_list()
     assert "terragrip soils" in (trust_sections.what_is_missing(shown).omitted or "")
 

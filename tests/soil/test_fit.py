@@ -186,6 +186,33 @@ def test_a_band_holds_the_middle_share_of_the_bootstrap_curves():
     curves = [CURVES["exponential"].value(slip, {**curve.parameters_, "a": a}) for a in curve.samples_[:, 0]]
     assert curve.free_ == ("a",)
     for level in (0.5, 0.95):
-        np.testing.assert_allclose(
-            curve.band(slip, level), np.quantile(curves, [0.5 - level / 2, 0.5 + level / 2], axis=0)
-        )
+        low, high = np.quantile(curves, [0.5 - level / 2, 0.5 + level / 2], axis=0)
+        assert np.all(curve.band(slip, level)[0] <= low)
+        assert np.all(curve.band(slip, level)[1] >= high)
+
+
+RISES = {  # of the literature, about as high at 10 % of slip
+    "hyperbola": lambda s: 1.2 * 12 * s / (1 + 12 * s),
+    "contact patch (Janosi)": lambda s: 0.7 * (1 + np.expm1(-40 * s) / np.maximum(40 * s, 1e-9)),
+    "wet asphalt (Burckhardt)": lambda s: -0.857 * np.expm1(-33.8 * s) - 0.347 * s,
+    "wheel numeric 15 (Wismer and Luth)": lambda s: -0.75 * np.expm1(-4.5 * s),
+}
+
+
+@pytest.mark.parametrize("rise", RISES.values(), ids=RISES)
+def test_beyond_its_data_a_band_holds_what_soils_of_other_forms_do(rise):
+    rng = np.random.default_rng(8160001)
+    slip, run = rng.uniform(0.005, 0.1, 4000), np.repeat(np.arange(10), 400)
+    mu = rise(slip) * (1 + 0.02 * rng.standard_normal(10))[run] + 0.05 * rng.standard_normal(4000)
+    curve = AdhesionCurve(bins=BinSettings(0.005, 0.005, 0.1, 20)).fit(slip, mu, run)
+    at = np.array([0.1, 0.2, 0.3])
+    low, high = curve.band(at)
+    assert np.all((low <= rise(at)) & (rise(at) <= high))
+    own = np.ptp(curve.interval_["a"]) * CURVES["exponential"].value(at, {"a": 1.0})
+    assert np.any(np.abs(rise(at) - curve.predict(at)) > own)  # the form's own interval holds it not
+
+
+def test_data_up_to_high_slips_leave_little_to_other_forms():
+    slip, mu, run = pairs(8, a=0.85)
+    low, high = AdhesionCurve().fit(slip, mu, run).band(np.array([0.1, 0.3, 0.55]))
+    assert np.all(high - low < 0.15 * high)

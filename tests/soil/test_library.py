@@ -121,6 +121,7 @@ def test_compare_says_how_far_apart():
     row = SoilLibrary({"fine": fitted()}).compare(paper_soils())[0]
     assert row["soil"] == "fine"
     assert row["largest"] < 0.05
+    assert row["to"] == pytest.approx(fitted().reach)
     other = SoilLibrary({"fine": fitted(seed=2)})
     assert SoilLibrary({"fine": fitted()}).compare(other)[0]["intervals_meet"] == {"a": True}
 

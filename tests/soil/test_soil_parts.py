@@ -107,10 +107,13 @@ def test_libraries_compare_over_five_to_sixty_per_cent_of_slip() -> None:
     off = 0.1 * CURVES["exponential"].value(np.linspace(0.05, 0.6, 111), {"a": 1.0})
     assert row == {
         "soil": "s",
+        "to": 0.6,
         "largest": pytest.approx(off.max()),
         "mean": pytest.approx(off.mean()),
         "intervals_meet": {"a": True},
     }
+    short = replace(soil(0.9, 0.85, 1.0), bins=({"slip": 0.04, "mean": 0.2}, {"slip": 0.2, "mean": 0.4}))
+    assert mine.compare(SoilLibrary({"s": short}))[0]["to"] == 0.2
     assert not mine.compare(SoilLibrary({"s": soil(0.9, 0.86, 1.0)}))[0]["intervals_meet"]["a"]
     assert not mine.compare(SoilLibrary({"s": soil(0.6, 0.5, 0.69)}))[0]["intervals_meet"]["a"]
     other = Soil("s", "effective", {"A": 0.4, "k": 9.0, "d": 0.0}, {"A": (0.3, 0.5)})

@@ -55,7 +55,9 @@ def test_the_figure_draws_each_curve_and_its_bins() -> None:
     curves = [line for line in axes.get_lines() if line.get_label() in ("clay", "hard")]
     assert len(curves) == 2
     slip, mu = curves[0].get_data()
-    assert axes.get_xlim() == (0.0, slip.max())
+    assert slip.max() == pytest.approx(0.3)  # of its last bin: dotted beyond
+    dotted = next(line for line in axes.get_lines() if line.get_linestyle() == ":")
+    assert axes.get_xlim() == (0.0, dotted.get_xdata().max())
     np.testing.assert_allclose(mu, 0.61234 * (1 - np.exp(-11 * slip)) - 0.1 * slip, atol=1e-12)
     (bars,) = axes.containers
     np.testing.assert_allclose(bars.lines[0].get_xydata(), [[0.1, 0.4], [0.3, 0.55]])

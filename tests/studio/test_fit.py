@@ -139,6 +139,16 @@ def test_a_saved_curve_is_read_back_and_another_of_its_name_refused(client: Test
     changed = {**soil, "replace": True, "parameters": {**soil["parameters"], "c2": 11.0}}  # type: ignore[dict-item]
     assert client.post("/api/soils/save", json=changed).status_code == 201
     assert SoilLibrary.load(folder / "mine.json")["sand"].parameters["c2"] == 11.0
+    fitted = fit(client, slip=[0.02, 0.04, 0.06, 0.08, 0.1], adhesion=[0.1, 0.18, 0.24, 0.29, 0.33]).json()
+    whole = {key: fitted[key] for key in ("model", "parameters", "free", "interval", "band", "bins")}
+    assert (
+        client.post("/api/soils/save", json={"library": "mine.json", "name": "clay", **whole}).status_code
+        == 201
+    )
+    saved = SoilLibrary.load(folder / "mine.json")["clay"]
+    assert saved.reach == pytest.approx(0.1)
+    low, high = saved.band([0.05, 0.3])
+    assert high[1] - low[1] > 3 * (high[0] - low[0])
     for bad in (
         {"library": "mine.csv"},
         {"model": "none"},

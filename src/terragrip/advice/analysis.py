@@ -123,7 +123,10 @@ def _of_soil(
     over = curves.over
     best = best_of(over, over.efficiency)
     power = best_of(over, over.productivity)
-    missing = _missing(best, power, curves, vehicle, measured="litres_per_hour" in _burnt(loaded, vehicle))
+    whose = "the drive" if own is not None else "the library"
+    missing = _missing(
+        best, power, curves, vehicle, whose, measured="litres_per_hour" in _burnt(loaded, vehicle)
+    )
     beyond = own is None and power.slip > curves.reach
     if drive["soil_resistance"] < 0:
         missing.insert(
@@ -170,8 +173,10 @@ def _known(best: Best, over: OverSlip) -> bool:
     return best.net_traction > 0 and over.loss(best.slip) <= MOST_LOST
 
 
-def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, measured: bool) -> list[str]:
-    """What is not known and what would show it; ``measured``: the fuel was."""
+def _missing(
+    best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, whose: str, *, measured: bool
+) -> list[str]:
+    """What is not known and what would show it; ``whose`` slips the curves' data are; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
     if not _known(best, curves.over):
@@ -181,9 +186,8 @@ def _missing(best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, *, m
         )
     elif best.slip > FARTHEST * curves.reach:
         missing.append(
-            f"the drive reaches {curves.reach:.0%} of slip; the best slip of {best.slip:.0%} follows from how soils behave in "
-            "general: pull harder "
-            f"to see it"
+            f"the slips of {whose} reach {curves.reach:.0%}; the best slip of {best.slip:.0%} follows from how soils behave in "
+            "general: pull harder to see it"
         )
     if power.interval[1] - power.interval[0] > WIDEST_POWER:
         beyond = power.slip > curves.reach

@@ -21,21 +21,24 @@ import numpy as np
 
 from terragrip.advice.samples import Samples
 from terragrip.arrays import Bools, Floats
+from terragrip.soil.forms import MISFIT, PRIOR, shape_at
 
 DRAWS = 300
 BINS = 12
 ROUNDS = 25
 LEAST_STRETCHES = 4
 LEAST_BINS = 3
+_DRIVES = {
+    "e": (0.0, np.nan, np.nan, np.nan),
+    "r_0": (0.07, 0.06, 0.0, 0.6),
+    "r_1": (0.06, 0.12, 0.0, 0.5),
+    "c": (0.3, 0.4, 0.0, 1.5),
+}
 NAMES = ("ln A", "ln k", "f", "e", "r_0", "r_1", "p", "c")
-CENTRE = np.array([np.log(0.55), np.log(11.0), 0.1, 0.0, 0.07, 0.06, 1.2, 0.3])
-SPREAD = np.array([0.4, 0.7, 0.3, np.nan, 0.06, 0.12, 0.5, 0.4])
-"""What soils are like before any data: A about .55, k about 11 (Brixius 7.5, the paper 11.4, Burckhardt's up to 30), a fall of a tenth,
-resistance .07 that grows by .06 over all of slip (Brixius: .5/sqrt(Bn); where slip digs wheels in, several times that); p from the brush's
-to the hyperbola's; c 0 on firm ground, mostly 0 to 1 by Wong and Reece's stresses on Wong's soils (benchmarks/wheel_stresses.py). The
-spread of e is the drive's own."""
-LOWER = np.array([-4.0, 0.0, -0.5, np.nan, 0.0, 0.0, 0.1, 0.0])
-UPPER = np.array([1.5, np.log(100.0), 1.5, np.nan, 0.6, 0.5, 2.5, 1.5])
+CENTRE, SPREAD, LOWER, UPPER = np.array([{**PRIOR, **_DRIVES}[name] for name in NAMES]).T
+"""What soils are like before any data: adhesion rises as in `soil.forms`; resistance .07 that grows by .06 over all of slip (Brixius:
+.5/sqrt(Bn); where slip digs wheels in, several times that); c 0 on firm ground, mostly 0 to 1 by Wong and Reece's stresses on Wong's soils
+(benchmarks/wheel_stresses.py). The spread of e is the drive's own."""
 E = NAMES.index("e")
 YIELDING, SOFT = 0.08, 0.18
 """Resistance up to which ground counts as firm, and from which it is taken to yield under the wheel as Wong and Reece's does."""
@@ -49,8 +52,6 @@ BY_BIN = 0.2
 """Share of slip's SD by which a bin's mean errs beyond the scatter of its stretches: .2 and .3 there."""
 SLIP_FLOOR = 0.006
 """SD of a bin's mean slip beyond its scatter: curves of the way, unequal radii."""
-MISFIT = 0.02
-"""Relative error of a bin's mean beyond its scatter: the form is not the soil."""
 
 
 @dataclass(frozen=True)
@@ -84,20 +85,7 @@ def adhesion(parameters: Floats, slip: Floats) -> Floats:
     """mu (draws, slips) of parameters (draws, 8) at measured slips (draws, slips)."""
     height, rate, fall, error, level, _, shape, share = (parameters[:, i, None] for i in range(len(NAMES)))
     s = slip - error
-    rise = np.sign(s) * _rise(np.exp(rate) * _three_quarters(shape) / np.log(4.0) * np.abs(s), shape)
-    return np.asarray(share * level + np.exp(height) * (rise - fall * s))
-
-
-def _rise(x: Floats, shape: Floats) -> Floats:
-    """h of dh/dx = (1 - h)^p, h(0) = 0, at x >= 0."""
-    q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
-    return np.asarray(-np.expm1(np.log(np.maximum(1 - q * x, 1e-12)) / q))
-
-
-def _three_quarters(shape: Floats) -> Floats:
-    """x at which h is 3/4."""
-    q = np.where(np.abs(1 - shape) < 1e-4, 1e-4, 1 - shape)
-    return np.asarray(-np.expm1(-q * np.log(4.0)) / q)
+    return np.asarray(share * level + np.exp(height) * shape_at(s, rate, fall, shape))
 
 
 def resistance(parameters: Floats, slip: Floats) -> Floats:

@@ -55,8 +55,7 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     The library's slips err alike by what they were learned with (its ``slip_noise``, else the rows'), as a drive's own do.
     """
     rng = np.random.default_rng(seed)
-    low, high = _band(soil)
-    width = rng.standard_normal((DRAWS + 1, 1)) / (2 * NORMAL_95)
+    off = rng.standard_normal((DRAWS + 1, 1)) / NORMAL_95
     growth = np.maximum(GROWTH[0] + GROWTH[1] * rng.standard_normal((DRAWS + 1, 1)), 0.0)
     shift = rng.standard_normal((DRAWS + 1, 1))
     slip_sd = float(soil.fit.get("slip_noise", {}).get("slip_std", np.nan))
@@ -65,7 +64,7 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     known = float(soil.fit.get("common_slip_sd") or 0.0)  # in the soil's own interval
     beyond = np.sqrt(max(lasting_sd(zero_slip_sd(vehicle), slip_sd) ** 2 - known**2, 0.0))
     error = beyond * rng.standard_normal((DRAWS + 1, 1))
-    width[0], growth[0], shift[0], error[0] = 0.0, GROWTH[0], 0.0, 0.0
+    off[0], growth[0], shift[0], error[0] = 0.0, GROWTH[0], 0.0, 0.0
     if samples is not None:
         level = float(np.average(samples.resistance, weights=samples.metres))
         at = max(float(np.average(samples.slip, weights=samples.metres)), 0.0)
@@ -76,29 +75,12 @@ def of_library(soil: Soil, samples: Samples | None, vehicle: Vehicle, seed: int 
     else:
         return None
     measured = GRID + error
-    mu = soil.value(measured) + width * np.interp(measured, GRID, high - low)
+    (low, high), mean = soil.band(measured), soil.value(measured)
+    mu = mean + off * np.where(off > 0, high - mean, mean - low)
     rho = np.maximum(level + spread * shift + growth * (GRID - at), 0.0)
-    reach = max((float(one["slip"]) for one in soil.bins), default=float(GRID[-1]))
+    reach = min(soil.reach, float(GRID[-1]))
     share = driven_share(vehicle, samples)
     return SoilCurves(over_slip(mu, rho, GRID, vehicle.tire_rolling_resistance, *share), mu, reach)
-
-
-def _band(soil: Soil) -> tuple[Floats, Floats]:
-    """The 95 % band of a library's curve over GRID: written with the fit, or by the interval of its one free parameter, else none."""
-    written = soil.fit.get("band")
-    if written:
-        return (np.interp(GRID, written["slip"], written[key]) for key in ("low", "high"))  # type: ignore[return-value]
-    free = list(soil.fit.get("free", ()))
-    if len(free) == 1 and free[0] in soil.interval:
-        from dataclasses import replace
-
-        ends = [
-            replace(soil, parameters={**soil.parameters, free[0]: x}).value(GRID)
-            for x in soil.interval[free[0]]
-        ]
-        return np.minimum(*ends), np.maximum(*ends)
-    value = soil.value(GRID)
-    return value, value
 
 
 def driven_share(vehicle: Vehicle, samples: Samples | None) -> tuple[float, float]:

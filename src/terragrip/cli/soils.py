@@ -175,18 +175,18 @@ def _joined(library: SoilLibrary, other: SoilLibrary, path: Path) -> SoilLibrary
 
 
 def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> str:
-    """Lines of text: each soil in both, the differences of adhesion over 5-60 % slip, and whether the intervals meet."""
+    """Lines of text: each soil in both, the differences of adhesion where both have data, and whether the intervals meet."""
     rows = library.compare(other)
     if not rows:
         return f"None of these soils is in {path}."
-    lines = [f"Compared with {path}, adhesion over 5 % to 60 % slip:"]
+    lines = [f"Compared with {path}, adhesion over the slips that both have data of:"]
     for row in rows:
         meet = row["intervals_meet"]
         sentence = "; ".join(
             f"intervals of {k} {'overlap' if v else 'do not overlap'}" for k, v in meet.items()
         )
         lines.append(
-            f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most"
+            f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most, to {row['to']:.0%} of slip"
             + (f"; {sentence}" if sentence else "")
         )
     return "\n".join(lines)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from terragrip.arrays import Bools, Floats
 from terragrip.estimation.rims import DRIVE
@@ -20,7 +21,7 @@ from terragrip.units import STANDARD_GRAVITY
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
     from terragrip.maps.places import Places
-    from terragrip.soil.library import SoilLibrary
+    from terragrip.soil.library import Soil, SoilLibrary
     from terragrip.vehicle import Vehicle
 
 
@@ -215,7 +216,8 @@ def _form(
     estimates: Estimates, reference: float, library: SoilLibrary | None
 ) -> Callable[[Floats], tuple[Floats, Floats, Floats]]:
     """The function of slip (n,) that gives x, dx/ds and the SD of x for want of the soil's form: each row's soil by its curve in the
-    library, else the paper's prototype, which is as far from the soil's as the usual `FORMS` are from each other. A soil that bends
+    library (beyond its data as sure as its band), else the paper's prototype, which is as far from the soil's as the usual `FORMS` are
+    from each other. A soil that bends
     otherwise is wrong to one side above the reference and to the other below it: so is that SD's sign."""
 
     def usual(name: str, slip: Floats) -> Floats:
@@ -225,7 +227,8 @@ def _form(
         prototype = CURVES["exponential"]
         x, slope = usual("exponential", slip), prototype.slope(slip, {}) / prototype.value(reference, {})
         apart = np.std([usual(name, slip) for name in FORMS], axis=0)
-        doubt = apart * np.sign(slip) * np.where(np.abs(slip) < reference, -1.0, 1.0)
+        side = np.sign(slip) * np.where(np.abs(slip) < reference, -1.0, 1.0)
+        doubt = apart * side
         if library is not None and "soil" in estimates.labels:
             labels = estimates.labels["soil"]
             for name in set(labels) & set(library):
@@ -234,7 +237,18 @@ def _form(
                 own = {k: v for k, v in soil.parameters.items() if k != "intercept"}
                 x[rows] = soil.value(slip[rows]) / level
                 slope[rows] = CURVES[soil.model].slope(slip[rows], own) / level
-                doubt[rows] = 0.0
+                doubt[rows] = (
+                    x[rows] * side[rows] * np.abs(beyond(soil, slip[rows]) - beyond(soil, reference))
+                )
         return x, slope, doubt
+
+    def beyond(soil: Soil, slip: ArrayLike) -> Floats:
+        """Relative SD of a curve beyond its data, by the farther end of its band."""
+        low, high = soil.band(slip)
+        value = soil.value(slip)
+        known = (np.abs(slip) <= soil.reach) | (value == 0)
+        return np.where(
+            known, 0.0, np.maximum(high - value, value - low) / (1.96 * np.abs(np.where(known, 1.0, value)))
+        )
 
     return form

@@ -60,8 +60,7 @@ class SoilCurves:
     @property
     def reach(self) -> float:
         """The largest slip of the bins: beyond it a curve rests on its form alone. Infinite for a curve without bins."""
-        bins = self.learned.curve.bins_
-        return float(bins.slip[bins.used].max()) if bins.used.any() else np.inf
+        return self.learned.soil.reach
 
     @property
     def by_slip(self) -> AdhesionCurve | None:

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from terragrip.arrays import Floats
+from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES, CurveModel, effective_parameters
 from terragrip.soil.bins import Bins, BinSettings, bin_pairs
+from terragrip.soil.forms import Forms, agreeing_forms
 from terragrip.soil.identifiability import Identifiability, at_bound, judge, left_open
 from terragrip.soil.least_squares import INTERCEPT, solve, starts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from terragrip.soil.library import SoilLibrary
+    from terragrip.soil.library import Soil, SoilLibrary
 
 FREE = "free"
 _LARGEST = 1.5
@@ -85,7 +86,7 @@ class AdhesionCurve:
         self.bins, self.bootstrap, self.seed = bins or BinSettings(), bootstrap, seed
         self.common_sd, self.bounds, self.common_slip_sd = common_sd, dict(bounds or {}), common_slip_sd
         self.start = None if start is None else dict(start)
-        self.written_band: tuple[Floats, Floats, Floats] | None = None  # slip, low, high of a stored fit
+        self.stored: Soil | None = None  # of a fit that was read
 
     def fit(self, slip: ArrayLike, adhesion: ArrayLike, run: ArrayLike | None = None) -> AdhesionCurve:
         """Fit to pairs, each of shape (n,); `run` (n,) are integer or string labels of samples that are not independent.
@@ -132,6 +133,8 @@ class AdhesionCurve:
             [] if self.identifiability_.identifiable else [self.identifiability_.sentence]
         )
         self.samples_: Floats | None = None
+        self._bin_sd: Floats | None = None  # of the used bins' means, over the bootstrap's draws
+        self._forms: Forms | None = None
         self.interval_: dict[str, tuple[float, float]] = {}
         if self.bootstrap and free:
             self._resample(curve, free, held, best)
@@ -153,34 +156,43 @@ class AdhesionCurve:
 
     @property
     def has_band(self) -> bool:
-        """Whether `band` is known: from the bootstrap; for a stored fit, from its band or its one free parameter's interval."""
-        return (
-            self.samples_ is not None
-            or self.written_band is not None
-            or (len(self.free_) == 1 and self.free_[0] in self.interval_)
-        )
+        """Whether `band` is known: from the bootstrap; for a stored fit as `Soil.has_band`."""
+        return self.samples_ is not None or (self.stored is not None and self.stored.has_band)
 
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Floats, Floats]:
-        """Pointwise interval of the curve at slips (n,), from the bootstrap. For a stored fit it is the 95 % interval, between the
-        slips of its band, or between the curves at the ends of the one free parameter's interval. Raises ValueError if none is known."""
+        """Pointwise interval of the soil's curve at slips (n,): of this form by the bootstrap, and of every other form that agrees with
+        the same bins (`soil.forms`), so that beyond the bins it is as wide as soils differ. For a stored fit it is the 95 % band of
+        `Soil.band`. Raises ValueError if none is known."""
         if not self.has_band:
             raise ValueError("this curve was fitted without a bootstrap")
         s = np.asarray(slip, dtype=float)
-        if self.samples_ is None and self.written_band is not None:
-            at, low, high = self.written_band
-            return np.interp(s, at, low), np.interp(s, at, high)
-        if self.samples_ is None:
-            (free,) = self.free_
-            given = {**self.parameters_, free: np.array(self.interval_[free])[:, None]}
-            edges = CURVES[self.model].value(s[None, :], given, given.pop(INTERCEPT, 0.0))
-            return edges.min(axis=0), edges.max(axis=0)
+        if self.samples_ is None and self.stored is not None:
+            return self.stored.band(s)
+        assert self.samples_ is not None
         given = {name: self.samples_[:, i, None] for i, name in enumerate(self.free_)}
         intercept = given.pop(INTERCEPT, self.parameters_.get(INTERCEPT, 0.0))
         held = {n: v for n, v in self.parameters_.items() if n not in self.free_ and n != INTERCEPT}
-        values = CURVES[self.model].value(s[None, :], {**held, **given}, intercept)
         tail = 50 * (1 - level)
-        low, high = np.percentile(values, [tail, 100 - tail], axis=0)
-        return low, high
+        own, other = (
+            np.percentile(values, [tail, 100 - tail], axis=0)
+            for values in (
+                CURVES[self.model].value(s[None, :], {**held, **given}, intercept),
+                self._other_forms().value(s) + intercept,
+            )
+        )
+        return np.minimum(own[0], other[0]), np.maximum(own[1], other[1])
+
+    def _other_forms(self) -> Forms:
+        """Curves of all forms that agree with the bins, one for each of the bootstrap's; drawn when they are first asked for."""
+        if self._forms is None and self.samples_ is not None and self._bin_sd is not None:
+            bins, drop = self.bins_, self.parameters_.get(INTERCEPT, 0.0)
+            used = bins.used
+            self._forms = agreeing_forms(
+                bins.slip[used], bins.mean[used] - drop, self._bin_sd, self.common_slip_sd, self.common_sd,
+                len(self.samples_), self.seed,
+            )  # fmt: skip
+        assert self._forms is not None
+        return self._forms
 
     def peak(self) -> tuple[float, float]:
         """(slip, mu) of the maximum on 0 to 1, without the intercept."""
@@ -208,7 +220,7 @@ class AdhesionCurve:
     def to_dict(self) -> dict[str, Any]:
         """The fit in the form of soils.json (architecture.md, contracts)."""
         band = {}
-        if self.samples_ is not None and len(self.free_) > 1:
+        if self.samples_ is not None:
             low, high = self.band(BAND)
             band = {
                 "band": {"slip": BAND.tolist(), "low": low.round(5).tolist(), "high": high.round(5).tolist()}
@@ -302,6 +314,7 @@ class AdhesionCurve:
         times[:, alive] = draws
         slip, mean, used = bins.drawn(times)
         enough = np.count_nonzero(used, axis=1) >= max(len(free), 2)
+        self._bin_sd = _sd_of_bins(mean, used)[bins.used] * np.sqrt(clusters / (clusters - 1))
         slip, mean, weight = slip[enough], mean[enough], (self._bin_weights(bins) * used)[enough]
         widen = _student(clusters - 1) / 1.959964 * np.sqrt(clusters / (clusters - 1))
         shared = rng.standard_normal((2, len(mean), 1)) / widen  # errors that few runs do not make less known
@@ -339,6 +352,14 @@ class AdhesionCurve:
             )
         }
         return AdhesionCurve(**{**same, **changes})
+
+
+def _sd_of_bins(mean: Floats, used: Bools) -> Floats:
+    """SD of each bin's mean (bins,) over draws (draws, bins), and not under that of all: few clusters tell a bin's own badly."""
+    count = np.maximum(used.sum(axis=0), 1)
+    centre = np.where(used, mean, 0.0).sum(axis=0) / count
+    square = np.where(used, (mean - centre) ** 2, 0.0)
+    return np.asarray(np.sqrt(np.maximum(square.sum(axis=0) / count, square.sum() / max(used.sum(), 1))))
 
 
 def _student(freedom: int) -> float:

@@ -24,13 +24,14 @@ def known_soils(library: SoilLibrary, names: Iterable[str]) -> Campaign:
 
 
 def _known(soil: Soil) -> LearnedSoil:
-    curve = _fitted(soil, soil.fit)
+    curve = _fitted(soil)
     paper = soil.fit.get("by_slip")
     by_slip = curve
     if paper:
         its = replace(soil, parameters=paper["parameters"], interval=_pairs(paper.get("interval")), r2=paper["r2"],
-                      nrmse=paper.get("nrmse"), bins=tuple(paper.get("bins") or ()))  # fmt: skip
-        by_slip = _fitted(its, {**soil.fit, "settings": paper.get("settings"), "band": paper.get("band")})
+                      nrmse=paper.get("nrmse"), bins=tuple(paper.get("bins") or ()),
+                      fit={**soil.fit, "settings": paper.get("settings"), "band": paper.get("band")})  # fmt: skip
+        by_slip = _fitted(its)
     noise = soil.fit.get("slip_noise")
     freed = None
     if noise:
@@ -38,8 +39,9 @@ def _known(soil: Soil) -> LearnedSoil:
     return LearnedSoil(soil, curve, by_slip, None, freed, (), ())
 
 
-def _fitted(soil: Soil, fit: Mapping[str, Any]) -> AdhesionCurve:
+def _fitted(soil: Soil) -> AdhesionCurve:
     """A curve from its stored fit: parameters, intervals, bins and badge, without the bootstrap's draws."""
+    fit = soil.fit
     known = {field.name for field in fields(BinSettings)}
     settings = BinSettings(**{k: v for k, v in (fit.get("settings") or {}).items() if k in known})
     curve = AdhesionCurve(soil.model, bins=settings, bootstrap=0)
@@ -48,9 +50,7 @@ def _fitted(soil: Soil, fit: Mapping[str, Any]) -> AdhesionCurve:
     curve.r2_ = np.nan if soil.r2 is None else soil.r2
     curve.nrmse_ = np.nan if soil.nrmse is None else soil.nrmse
     curve.samples_, curve.notes_, curve.at_bound_ = None, list(fit.get("notes", ())), []
-    if band := fit.get("band"):
-        at, low, high = (np.array(band[name], dtype=float) for name in ("slip", "low", "high"))
-        curve.written_band = (at, low, high)
+    curve.stored = soil
     column = {name: np.array([row.get(name, np.nan) for row in soil.bins], dtype=float) for name in _BIN}
     weight = np.where(np.isfinite(column["metres"]), column["metres"], column["count"])[None, :]
     curve.bins_ = Bins(

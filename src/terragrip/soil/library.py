@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,6 +69,38 @@ class Soil:
         given = {k: v for k, v in self.parameters.items() if k != "intercept"}
         return CURVES[self.model].value(slip, given, self.parameters.get("intercept", 0.0))
 
+    @property
+    def reach(self) -> float:
+        """The largest slip of the bins: beyond it the curve rests on its form alone. Infinite for a curve without bins."""
+        return max(
+            (float(one["slip"]) for one in self.bins if None not in (one.get("slip"), one.get("mean"))),
+            default=math.inf,
+        )
+
+    @property
+    def has_band(self) -> bool:
+        """Whether `band` is known: written with the fit, or by the interval of its one free parameter."""
+        return bool(self.fit.get("band")) or self._ends is not None
+
+    @property
+    def _ends(self) -> tuple[str, tuple[float, float]] | None:
+        """The one free parameter with its interval."""
+        free = list(self.fit.get("free", ()))
+        return (free[0], self.interval[free[0]]) if len(free) == 1 and free[0] in self.interval else None
+
+    def band(self, slip: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The 95 % band (low, high) of the curve at slips of any shape: as written with the fit, or by the interval of its one free
+        parameter; the curve itself where neither is known."""
+        s = np.asarray(slip, dtype=float)
+        if written := self.fit.get("band"):
+            low, high = (np.interp(np.abs(s), written["slip"], written[key]) for key in ("low", "high"))
+            return np.where(s < 0, -high, low), np.where(s < 0, -low, high)
+        if self._ends is None:
+            return self.value(s), self.value(s)
+        name, ends = self._ends
+        one, other = (replace(self, parameters={**self.parameters, name: end}).value(s) for end in ends)
+        return np.minimum(one, other), np.maximum(one, other)
+
     def to_dict(self) -> dict[str, Any]:
         """The soil in the form of soils.json; unknown values are null."""
         return {
@@ -78,6 +110,7 @@ class Soil:
             "r2": self.r2,
             "nrmse": self.nrmse,
             "bins": [dict(b) for b in self.bins],
+            "reach": self.reach if math.isfinite(self.reach) else None,
             "resistance": None
             if self.resistance is None
             else {"mean": self.resistance[0], "std": self.resistance[1]},
@@ -123,7 +156,7 @@ class SoilLibrary(Mapping[str, Soil]):
         if not isinstance(bare, dict):
             raise InputError("is not a mapping", file=file, place="without_curve")
         soils, without = (
-            {name: _soil(name, entry, file, key) for name, entry in entries.items()}
+            {name: soil_of(name, entry, file, key) for name, entry in entries.items()}
             for key, entries in (("soils", data["soils"]), ("without_curve", bare))
         )
         return cls(soils, data.get("provenance") or {}, data.get("not_fitted") or {}, without)
@@ -187,13 +220,15 @@ class SoilLibrary(Mapping[str, Soil]):
         return SoilLibrary({name: both[name] for name in order}, provenance, missed, without)
 
     def compare(self, other: SoilLibrary) -> list[dict[str, Any]]:
-        """For each soil in both: the largest and the mean difference of mu over slips 5-60 %, and whether intervals of one model meet."""
-        slip = np.linspace(0.05, 0.60, 111)
+        """For each soil in both: the largest and the mean difference of mu over slips of 5 % to `to`, 60 % or where the data of either end
+        (from half of `to` where that is below 10 %), and whether intervals of one model meet."""
         rows = []
         for name in self.soils:
             if name not in other.soils:
                 continue
             mine, theirs = self.soils[name], other.soils[name]
+            to = min(0.60, mine.reach, theirs.reach)
+            slip = np.linspace(min(0.05, to / 2), to, 111)
             off = theirs.value(slip) - mine.value(slip)
             shared = set(mine.interval) & set(theirs.interval) if mine.model == theirs.model else set()
             meet = {
@@ -204,6 +239,7 @@ class SoilLibrary(Mapping[str, Soil]):
             rows.append(
                 {
                     "soil": name,
+                    "to": to,
                     "largest": float(np.abs(off).max()),
                     "mean": float(off.mean()),
                     "intervals_meet": meet,
@@ -225,7 +261,8 @@ def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def _soil(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
+def soil_of(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
+    """The soil of an entry in the form of soils.json; InputError, with the file and the place, where a value cannot be read."""
     place = f"{under}.{name}"
     model = entry.get("model") if isinstance(entry, dict) else None
     if not isinstance(model, str) or model not in CURVES:
@@ -260,7 +297,18 @@ def _soil(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
             _number(row.get(key), file, f"{place}.bins[{i}].{key}")
     _refuse_bad_fit(entry, values, file, place)
     resistance = entry.get("resistance")
-    known = {"model", "parameters", "interval", "r2", "nrmse", "bins", "resistance", "spread", "source"}
+    known = {
+        "model",
+        "parameters",
+        "interval",
+        "r2",
+        "nrmse",
+        "bins",
+        "reach",
+        "resistance",
+        "spread",
+        "source",
+    }
     return Soil(
         name=name,
         model=model,

@@ -21,7 +21,8 @@ _SLIPS = np.linspace(0.0, 0.65, 131)
 
 
 def table_of(soils: Mapping[str, Soil]) -> pd.DataFrame:
-    """A row per soil: model, parameters with 95 % intervals (``<name>_low``, ``<name>_high``), R2, NRMSE, mean rho_s and its SD."""
+    """A row per soil: model, parameters with 95 % intervals (``<name>_low``, ``<name>_high``), R2, NRMSE, the largest slip of the bins,
+    mean rho_s and its SD."""
     import pandas as pd
 
     rows = {}
@@ -31,7 +32,8 @@ def table_of(soils: Mapping[str, Soil]) -> pd.DataFrame:
             row |= {f"{parameter}_low": low, f"{parameter}_high": high}
         resistance, std = soil.resistance or (None, None)
         rows[name] = row | {
-            "r2": soil.r2, "nrmse": soil.nrmse, "resistance": resistance, "resistance_std": std, "source": soil.source,
+            "r2": soil.r2, "nrmse": soil.nrmse, "reach": soil.reach if soil.bins else None,
+            "resistance": resistance, "resistance_std": std, "source": soil.source,
         }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("soil")
 
@@ -58,7 +60,7 @@ def html_of(soils: Mapping[str, Soil], not_fitted: Mapping[str, str]) -> str:
 
 
 def plot(soils: Mapping[str, Soil]) -> Figure:
-    """Adhesion over slip: each soil's curve, and its bins with their standard deviations."""
+    """Adhesion over slip: each soil's curve with its band, dotted beyond its data, and its bins with their standard deviations."""
     if not soils:
         raise InputError("there is no soil to draw", hint="learn one from labelled estimates")
     figure = notebook_figure(7.6, 4.6)
@@ -66,7 +68,11 @@ def plot(soils: Mapping[str, Soil]) -> Figure:
         axes = figure.subplots()
         for number, (name, soil) in enumerate(soils.items()):
             color = LINES[number % len(LINES)]
-            axes.plot(_SLIPS, soil.value(_SLIPS), color=color, linewidth=1.8, label=name)
+            within, beyond = soil.reach >= _SLIPS, min(soil.reach, _SLIPS[-1]) <= _SLIPS
+            axes.plot(_SLIPS[within], soil.value(_SLIPS[within]), color=color, linewidth=1.8, label=name)
+            axes.plot(_SLIPS[beyond], soil.value(_SLIPS[beyond]), ":", color=color, linewidth=1.8)
+            if soil.has_band:
+                axes.fill_between(_SLIPS, *soil.band(_SLIPS), color=color, alpha=0.12, linewidth=0)
             bins = [b for b in soil.bins if b.get("mean") is not None and b.get("slip") is not None]
             if bins:
                 axes.errorbar(

@@ -129,7 +129,7 @@ async function keep(state: State): Promise<void> {
     model: curve.model,
     parameters: curve.parameters,
     source: curve.source,
-    ...(fitted ? { interval: fitted.interval, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins } : {}),
+    ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins } : {}),
   };
   const store = (replace: boolean): Promise<unknown> => send("POST", "soils/save", { ...soil, replace });
   try {

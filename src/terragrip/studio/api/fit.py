@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
 from terragrip.errors import InputError
-from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import PULL, BinSettings, chosen_bins
 from terragrip.soil.estimates import GatheredRuns
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import LearnedSoil, bin_parts
-from terragrip.soil.library import Soil, SoilLibrary
+from terragrip.soil.library import Soil, SoilLibrary, soil_of
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here, Studio
 
@@ -69,7 +68,9 @@ class SaveRequest(BaseModel):
     name: str = Field(min_length=1, max_length=100)
     model: str
     parameters: dict[str, FiniteFloat]
-    interval: dict[str, tuple[FiniteFloat, FiniteFloat]] = {}
+    free: list[str] = []
+    interval: dict[str, list[FiniteFloat]] = {}
+    band: dict[Literal["slip", "low", "high"], list[FiniteFloat]] | None = None
     r2: FiniteFloat | None = None
     nrmse: FiniteFloat | None = None
     bins: list[dict[str, FiniteFloat]] = []
@@ -116,10 +117,6 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
     else:
         curve = _learned(studio, target, wanted).curve
     result: dict[str, Any] = curve.to_dict()
-    grid = np.linspace(0.0, 1.0, 101)
-    if curve.samples_ is not None:
-        low, high = curve.band(grid)
-        result["band"] = {"slip": grid.tolist(), "low": low.tolist(), "high": high.tolist()}
     result["peak"] = curve.peak()
     result["at_bound"] = curve.at_bound_
     plain: dict[str, Any] = finite(result)
@@ -130,15 +127,8 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
 def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     """Put a soil into a library, which is made where there is none."""
     target = studio.folder.new_file(wanted.library, (".json",))
-    if wanted.model not in CURVES:
-        raise InputError(f"there is no curve model {wanted.model!r}")
-    try:
-        CURVES[wanted.model].complete({k: v for k, v in wanted.parameters.items() if k != "intercept"})
-    except ValueError as error:
-        raise InputError(str(error)) from None
-    soil = Soil(
-        wanted.name, wanted.model, wanted.parameters, wanted.interval, wanted.r2, wanted.nrmse, tuple(wanted.bins), source=wanted.source
-    )  # fmt: skip
+    entry = wanted.model_dump(exclude={"library", "name", "replace"}, exclude_defaults=True)
+    soil = soil_of(wanted.name, {"source": wanted.source, **entry}, wanted.library)
     with studio.own.saving():  # two pages that save at once keep both soils
         library = SoilLibrary.load(target) if target.exists() else SoilLibrary({})
         merged = library.merge(SoilLibrary({soil.name: soil}), "replace" if wanted.replace else "refuse")
