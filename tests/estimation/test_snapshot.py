@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import pytest
 
 from drives import drive, robot
@@ -35,6 +38,15 @@ def test_a_snapshot_does_not_disturb(rows):
     for row in rows[:100]:
         taken.snapshot()
         assert taken.update(row).to_dict() == plain.update(row).to_dict()
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_goes_on_by_itself(rows, copied):
+    one, plain = TractionEstimator(robot()), TractionEstimator(robot())
+    other = copied(one)
+    for row in rows[:50]:
+        other.update(row)
+    assert one.update(rows[0]).to_dict() == plain.update(rows[0]).to_dict()
 
 
 def test_the_vehicle_and_settings_come_back(rows):

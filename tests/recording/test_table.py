@@ -136,6 +136,7 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         ),
         (lambda c: {**c, "time": 1.7e15 + 1e6 * c["time"]}, "column time: is 1.7e+15 s, past the year 5000: since 1970 in us?"),
         (lambda c: spoilt(c, "drawbar_force", 16, -np.inf), "column drawbar_force, row 17 (time 0.16 s): is infinite"),
+        (lambda c: spoilt(c, "drawbar_force", 16, 1.8e200), "column drawbar_force, row 17 (time 0.16 s): is 1.8e+200, which"),
         (lambda c: {**c, "ground_speed": np.full(6000, np.nan)}, "column ground_speed: has no value"),
         (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: has no value"),
         (
@@ -247,6 +248,19 @@ def test_any_table_is_a_recording_or_refused(table: dict[str, Any]) -> None:
     assert np.all(np.diff(recording.time) > 0)
     assert all(len(values) == len(recording) > 0 for values in recording.channels.values())
     assert not any(np.isinf(values).any() for values in recording.channels.values())
+
+
+def test_dates_in_words_give_the_clock_as_dates_do() -> None:
+    stamps = pd.date_range(
+        "2026-03-29 00:59:59", periods=4, freq="500ms", tz="Europe/Berlin"
+    )  # summer time begins
+    speeds = {"ground_speed": [1.0] * 4, "wheel_speed_fl": [2.0] * 4}
+    dates, words = (
+        Recording.from_frame(pd.DataFrame({"time": time, **speeds}))
+        for time in (stamps, [one.isoformat() for one in stamps])
+    )
+    assert words.start == dates.start == stamps[0].timestamp()
+    assert words.time.tolist() == dates.time.tolist() == [0.0, 0.5, 1.0, 1.5]
 
 
 def test_a_clock_that_would_leave_its_range_within_the_recording_has_no_zero() -> None:

@@ -173,6 +173,26 @@ def test_calls_that_cannot_be():
             AdhesionCurve(**bad).fit(np.linspace(0, 0.6, 2000), np.linspace(0, 0.6, 2000))
 
 
+def test_a_curve_that_is_not_fitted_says_so():
+    curve = AdhesionCurve()
+    for call in (lambda: curve.predict(0.1), lambda: curve.band(0.1), curve.peak, curve.to_dict, curve.plot):
+        with pytest.raises(InputError, match="the curve is not fitted; call fit first"):
+            call()
+
+
+def test_a_band_has_the_shape_of_its_slips():
+    curve = AdhesionCurve(bootstrap=50).fit(*pairs(8, a=0.85))
+    low, high = curve.band([[0.1, 0.2], [0.3, 0.4]])
+    assert low.shape == high.shape == (2, 2)
+    assert curve.band(0.2) == (low[0, 1], high[0, 1])
+
+
+def test_a_run_without_a_name_is_one():
+    slip, mu, run = pairs(8, a=0.85)
+    named = [None if one == 0 else f"run {one}" for one in run]
+    assert AdhesionCurve(bootstrap=50).fit(slip, mu, named).bins_.clusters == np.unique(run).size
+
+
 def test_grass_has_its_own_range():
     slip, mu, run = pairs(9, a=0.4)
     curve = AdhesionCurve(bins=BinSettings(upper=0.40)).fit(slip, mu, run)

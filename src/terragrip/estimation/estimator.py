@@ -301,6 +301,10 @@ class TractionEstimator:
         body = struct.pack("<I", len(text)) + text + self._engine.snapshot()
         return seal(_SNAPSHOT_MAGIC, body)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles and copies by `snapshot`: a copy goes on by itself, where a plain one would share the kernel's state."""
+        return type(self).restore, (self.snapshot(),)
+
     @classmethod
     @understood()
     def restore(cls, data: bytes) -> Self:

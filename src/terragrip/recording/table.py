@@ -14,7 +14,7 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
-from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
+from terragrip.recording.columns import columns_of, numbers, seconds, stamps_of, start_of, texts
 from terragrip.recording.schema import (
     LABELS,
     REFERENCE,
@@ -74,6 +74,7 @@ class Recording:
         """
         columns = columns_of(frame, source)
         checks.require_columns(columns, source)
+        columns = {**columns, TIME: stamps_of(columns[TIME], source)}
         result, remark = cls.of_block(columns, source)
         remarks = [*notes, *remark, *checks.remarks(columns)]
         if start is None:

@@ -96,7 +96,9 @@ class AdhesionCurve:
         Raises InputError where the data have fewer used bins than free parameters, or only one, and on bounds that the model does not have.
         """
         _refuse_percent(slip)
-        labels = None if run is None else np.unique(np.ravel(np.asarray(run)), return_inverse=True)[1]
+        named = np.ravel(np.asarray(run))
+        named = named.astype(str) if named.dtype.kind == "O" else named  # None among names is one too
+        labels = None if run is None else np.unique(named, return_inverse=True)[1]
         return self.fit_bins(bin_pairs(slip, adhesion, labels, self.bins.papers()))
 
     def fit_bins(self, bins: Bins) -> AdhesionCurve:
@@ -150,8 +152,9 @@ class AdhesionCurve:
             self.notes_.append(sentence)
 
     def predict(self, slip: ArrayLike) -> Floats:
-        """mu (or kappa, with an intercept) at the slips, same shape. Raises InputError where they are per cents."""
+        """mu (or kappa, with an intercept) at the slips, same shape. Raises InputError where they are per cents, or before `fit`."""
         _refuse_percent(slip)
+        self._refuse_unfitted()
         return CURVES[self.model].value(slip, self._of_model(), self.parameters_.get(INTERCEPT, 0.0))
 
     @property
@@ -160,14 +163,16 @@ class AdhesionCurve:
         return self.samples_ is not None or (self.stored is not None and self.stored.has_band)
 
     def band(self, slip: ArrayLike, level: float = 0.95) -> tuple[Floats, Floats]:
-        """Pointwise interval of the soil's curve at slips (n,): of this form by the bootstrap, and of every other form that agrees with
-        the same bins (`soil.forms`), so that beyond the bins it is as wide as soils differ. For a stored fit it is the 95 % band of
-        `Soil.band`. Raises ValueError if none is known."""
+        """Pointwise interval of the soil's curve at slips of any shape: of this form by the bootstrap, and of every other form that
+        agrees with the same bins (`soil.forms`), so that beyond the bins it is as wide as soils differ. For a stored fit it is the 95 %
+        band of `Soil.band`. Raises ValueError if none is known, InputError before `fit`."""
+        self._refuse_unfitted()
         if not self.has_band:
             raise ValueError("this curve was fitted without a bootstrap")
-        s = np.asarray(slip, dtype=float)
+        slips = np.asarray(slip, dtype=float)
         if self.samples_ is None and self.stored is not None:
-            return self.stored.band(s)
+            return self.stored.band(slips)
+        s = slips.ravel()
         assert self.samples_ is not None
         given = {name: self.samples_[:, i, None] for i, name in enumerate(self.free_)}
         intercept = given.pop(INTERCEPT, self.parameters_.get(INTERCEPT, 0.0))
@@ -180,7 +185,8 @@ class AdhesionCurve:
                 self._other_forms().value(s) + intercept,
             )
         )
-        return np.minimum(own[0], other[0]), np.maximum(own[1], other[1])
+        low, high = np.minimum(own[0], other[0]), np.maximum(own[1], other[1])
+        return low.reshape(slips.shape), high.reshape(slips.shape)
 
     def _other_forms(self) -> Forms:
         """Curves of all forms that agree with the bins, one for each of the bootstrap's; drawn when they are first asked for."""
@@ -195,7 +201,8 @@ class AdhesionCurve:
         return self._forms
 
     def peak(self) -> tuple[float, float]:
-        """(slip, mu) of the maximum on 0 to 1, without the intercept."""
+        """(slip, mu) of the maximum on 0 to 1, without the intercept. Raises InputError before `fit`."""
+        self._refuse_unfitted()
         return CURVES[self.model].peak(self._of_model())
 
     def plot(self) -> Figure:
@@ -213,12 +220,11 @@ class AdhesionCurve:
         """The curve as the one soil of a library."""
         from terragrip.soil.library import Soil, SoilLibrary
 
-        if not hasattr(self, "bins_"):
-            raise InputError("the curve is not fitted", hint="call fit first")
         return SoilLibrary({"curve": Soil.from_curve("curve", self)})
 
     def to_dict(self) -> dict[str, Any]:
-        """The fit in the form of soils.json (architecture.md, contracts)."""
+        """The fit in the form of soils.json (architecture.md, contracts). Raises InputError before `fit`."""
+        self._refuse_unfitted()
         band = {}
         if self.samples_ is not None:
             low, high = self.band(BAND)
@@ -240,6 +246,10 @@ class AdhesionCurve:
             **({"common_slip_sd": self.common_slip_sd} if self.interval_ else {}),
             **band,
         }
+
+    def _refuse_unfitted(self) -> None:
+        if not hasattr(self, "parameters_"):
+            raise InputError("the curve is not fitted", hint="call fit first")
 
     def _of_model(self) -> dict[str, float]:
         return {name: value for name, value in self.parameters_.items() if name != INTERCEPT}
