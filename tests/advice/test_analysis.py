@@ -210,6 +210,11 @@ def test_what_would_show_the_slip_of_most_power_was_not_driven_yet(slip, pulls):
     assert said.endswith(f"a drive with pulls {pulls} would show it")
 
 
+def test_a_table_that_is_not_in_a_list_is_refused():
+    with pytest.raises(InputError, match="give a list of Estimates"):
+        advise(drive(metres=20), VEHICLE)
+
+
 def test_slip_above_the_best_is_never_told_to_load_more():
     """Pulls that come and go: their mean lies below the best pull, their mean slip above the best slip."""
     one = only([drive(top=0.25, metres=300)])

@@ -55,10 +55,14 @@ def advise(
     """Advice by soil name ("" where rows have no label), and metres driven by soil.
 
     ``soils``: known curves (a library), used for soils of the same name (a single one also for rows without a label); others
-    are learned from the estimates. Raises InputError where no table is given, or torques are in some tables only.
+    are learned from the estimates. Raises InputError where no table is given, or other than a list, or torques are in some tables only.
     """
     if not tables:
         raise InputError("no estimates are given", hint="name at least one file")
+    if strange := [one for one in tables if not isinstance(one, Estimates)]:
+        raise InputError(
+            f"{type(strange[0]).__name__} is no table of estimates", hint="give a list of Estimates"
+        )
     if not any(one.has_adhesion for one in tables):
         return {"": advise_slip(tables, vehicle)}, {"": 0.0}
     if not all(one.has_adhesion for one in tables):

@@ -40,11 +40,11 @@ class Soil:
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     r2: float | None = None
     nrmse: float | None = None
-    bins: tuple[Mapping[str, float], ...] = ()
+    bins: tuple[Mapping[str, float], ...] = field(default=(), repr=False)
     resistance: tuple[float, float] | None = None
     spread: float | None = None
     source: str = ""
-    fit: Mapping[str, Any] = field(default_factory=dict)
+    fit: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def from_curve(

@@ -202,6 +202,8 @@ def test_nothing_to_calibrate_from_and_foreign_logs_are_refused(drive: Make, veh
     with pytest.raises(InputError, match="no recording"):
         calibrate([], vehicle)
     log = drive(20)
+    with pytest.raises(InputError, match="str is no recording"):
+        calibrate(log.to_pandas(), vehicle)  # its columns' names come one by one
     channels = {name.replace("_fl", "_xx"): values for name, values in log.channels.items()}
     with pytest.raises(InputError, match="no wheel xx"):
         calibrate(Recording(log.time, channels), vehicle)

@@ -81,6 +81,11 @@ def calibrate(
     InputError: there is no log, or one does not fit the vehicle.
     """
     logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if strange := [one for one in logs if not isinstance(one, Recording)]:
+        raise InputError(
+            f"{type(strange[0]).__name__} is no recording",
+            hint="give what tg.read(path) returns, or a list of them",
+        )
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
