@@ -23,6 +23,7 @@ class LiveService:
     step = 0.05
     vehicles: tuple[str, ...] = ()  # of a service of many; the n-th drives n times as fast as `VALUES` say
     setpoint: dict[str, Any] | None = None  # what is published of it, four times a second
+    quiet: tuple[str, ...] = ()  # what a status says of silent sources
 
     def __init__(self) -> None:
         self.mode, self.address = "measured", ""
@@ -65,9 +66,8 @@ class LiveService:
             if row % 5 == 0 and self.setpoint and self.mode == "measured":
                 await socket.send(json.dumps({"kind": "setpoint", "time": row * self.step, **self.setpoint}))
             if row % 20 == 0 and self.mode != "frozen":
-                await socket.send(
-                    json.dumps({"kind": "status", "time": row * self.step, "delay": 0.0, "counts": {}})
-                )
+                status = {"kind": "status", "time": row * self.step, "delay": 0.0, "counts": {}}
+                await socket.send(json.dumps({**status, "silent": self.quiet}))
             await asyncio.sleep(0.05)
 
     async def _run(self) -> None:

@@ -52,6 +52,21 @@ def test_a_dead_source_shows_on_the_live_page(page: Any, served: Served) -> None
         assert page.evaluate(mark) == "line-through"
 
 
+def test_a_silent_source_is_named_while_others_go_on(page: Any, served: Served) -> None:
+    with listened_to(served) as service:
+        page.goto(f"{served.url}/#/live")
+        page.wait_for_function("() => window.terragripLive?.feed.age('status') < 1")
+        assert page.is_hidden("#live-silent")
+        assert page.get_by_label("Look back").count() == 1
+        service.quiet = ("nothing came from serial:/dev/ttyUSB0 for 3.2 s",)
+        page.wait_for_selector("#live-silent:has-text('Nothing came from serial:/dev/ttyUSB0 for 3.2 s')")
+        assert page.inner_text("#live-state") == "connected"
+        page.click("a:text-is('Cab')")
+        page.wait_for_selector("#cab-age:has-text('Nothing came from serial:/dev/ttyUSB0 for 3.2 s')")
+        service.quiet = ()
+        page.wait_for_selector("#cab-age:not(:has-text('Nothing'))")
+
+
 def test_without_a_service_nothing_is_called_lost(page: Any, served: Served, folder: Path) -> None:
     (folder / "estimates.parquet").unlink()
     page.goto(f"{served.url}/#/live")

@@ -48,29 +48,28 @@ export class Alarms {
     void this.audio?.close();
   }
 
-  /** Check the newest row. */
+  /** Check the newest measured row. */
   check(now: Reading, event: string): void {
     const unit = unitFor("share");
     const over = (name: string, value: number, limit: number | null): string | false =>
       limit !== null && 100 * value > limit && `${name} ${withUnit(fixed(value, unit), unit)} is over ${withUnit(digits((limit / 100) * unit.scale), unit)}`;
     const causes = [over("Slip", now.slip.value, this.set.slip), over("Grip in use", now.grip.value, this.set.grip)].filter((one) => one !== false);
-    const text = causes.join("; ");
-    if (text !== this.causes) {
-      this.causes = text;
-      this.element.hidden = !text;
-      fill(this.element, text);
-    }
-    if (text || event in WARNING) this.ring(880);
+    this.show(causes.join("; "), false);
+    if (this.causes || event in WARNING) this.ring(880);
   }
 
-  /** The source has fallen silent, or speaks again. */
+  /** The source has fallen silent, or speaks again. What was over its limit in the last measured row stays, as that. */
   silent(is: boolean): void {
-    if (is) {
-      this.causes = "";
-      this.element.hidden = true; // of a row that is old
-      this.ring(440);
-    }
+    this.show(this.causes, is);
+    if (is) this.ring(440);
     this.isSilent = is;
+  }
+
+  private show(causes: string, isOld: boolean): void {
+    this.causes = causes;
+    const text = causes && isOld ? `${causes} in the last measurement` : causes;
+    if (this.element.textContent !== text) fill(this.element, text);
+    this.element.hidden = !text;
   }
 
   private ring(pitch: number): void {

@@ -7,7 +7,7 @@ import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitsChooser, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, of, type Said } from "./feed";
-import { ageOf, brief, eventNow, LINGER, reading, seconds, WARNING, type Figure } from "./numbers";
+import { ageOf, brief, eventNow, LINGER, reading, seconds, sentence, STATUS_AGE, WARNING, type Figure } from "./numbers";
 
 const CHECK = 100; // ms
 
@@ -29,7 +29,7 @@ export const page: Page = (main, { query }) => {
   let peak = NaN; // largest adhesion of the online curve over its scale
   let delay = 0;
   let warnedAt = -Infinity;
-  let why = "";
+  let [why, silent] = ["", ""];
   void tried(() => sampled({ model: "exponential", parameters: { a: 1 } })).then((shape) => shape && (peak = shape.peak[1]));
   const feed = new Feed(() => new URLSearchParams(replay ? { replay, speed: String(speed) } : vehicle).toString());
 
@@ -39,7 +39,7 @@ export const page: Page = (main, { query }) => {
   }
 
   feed.onSaid = (said: Said) => {
-    if (said.kind === "status") delay = said.delay ?? 0;
+    if (said.kind === "status") [delay, silent] = [said.delay ?? 0, sentence(said.silent)];
     else if (said.kind in WARNING && said.source !== undefined) warn(said.kind, said.text ?? "");
   };
   feed.onState = (_, reason) => {
@@ -64,7 +64,7 @@ export const page: Page = (main, { query }) => {
       else if (!(ring.now - warnedAt < LINGER)) fill(warning);
       const now = reading(ring, hello, peak);
       for (const name of ["slip", "grip", "speed"] as const) tiles[name].set(now[name]);
-      alarms.check(now, event);
+      if (!ring.isPredicted) alarms.check(now, event);
       look();
     });
   }
@@ -76,8 +76,8 @@ export const page: Page = (main, { query }) => {
     main.classList.toggle("dead", dead && !predicted);
     main.classList.toggle("predicted", predicted);
     const said = !feed.ring.taken ? "NO DATA YET" : predicted ? `PREDICTED ONLY, no measurement for ${seconds(unmeasured)}` : `NO DATA for ${seconds(unmeasured)}`;
-    if (dead || predicted) fill(age, said, feed.state === "lost" ? h("small", {}, why) : feed.state === "ended" ? " (the run has ended)" : null);
-    else age.textContent = `measured ${seconds(unmeasured)} ago`;
+    const more = feed.state === "lost" ? why : feed.state === "connected" && feed.age("status") < STATUS_AGE ? silent : "";
+    fill(age, dead || predicted ? said : `measured ${seconds(unmeasured)} ago`, feed.state === "ended" ? " (the run has ended)" : more && h("small", {}, more));
     alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }
   const watch = window.setInterval(look, CHECK);

@@ -26,6 +26,8 @@ export interface Said {
   row_rate?: number;
   delay?: number;
   waiting?: number;
+  /** Sources of which nothing came lately, a sentence each. */
+  silent?: string[];
 }
 
 /** The query for a vehicle of many; empty for the first. */

@@ -75,6 +75,9 @@ export function ageOf(feed: Feed, delay: number, speed: number, held: boolean) {
 
 export const seconds = (age: number): string => (Number.isFinite(age) ? `${age.toFixed(1)} s` : "ages");
 
+/** The sources that are silent, as the service says it. */
+export const sentence = (silent: string[] = []): string => silent.join("; ").replace(/^./, (first) => first.toUpperCase());
+
 export function oldSaid(predicted: boolean, age: number, ended: boolean): string {
   return predicted
     ? `Predicted: no measurement for ${seconds(age)}; intervals grow until there is one.`

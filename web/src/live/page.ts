@@ -9,13 +9,12 @@ import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitNamed, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, of, type Said } from "./feed";
-import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, WARNING } from "./numbers";
+import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, sentence, STATUS_AGE, WARNING } from "./numbers";
 import { SetpointLine, type Setpoint } from "./setpoint";
 import { Traces, type Trace } from "./traces";
 
-/** Seconds between checks of the last row's age, and after which a status is out of date (one comes every second). */
+/** Seconds between checks of the last row's age. */
 const CHECK = 0.1;
-const STATUS_AGE = 2.5;
 
 /** Seconds that the traces can show. */
 const SPANS = [10, 30, 60, 120, 300];
@@ -32,6 +31,7 @@ export const page: Page = (main, { notices, query }) => {
   const soil = tile("Soil", null);
   const speedTile = tile("Speed", "speed");
   const old = h("p", { class: "old", id: "live-age", hidden: true });
+  const quiet = h("p", { class: "old", id: "live-silent", hidden: true });
   const said = h("ul", { class: "said", "aria-label": "Events", tabindex: "0" });
   let warnedAt = -Infinity;
   let peak = NaN; // largest adhesion of the online curve over its scale
@@ -66,7 +66,7 @@ export const page: Page = (main, { notices, query }) => {
     begin = Number(seek.value);
     feed.again();
   });
-  const past = h("input", { type: "range", id: "live-back", step: "any", value: "100", disabled: true, "aria-label": "Look back while recording" });
+  const past = h("input", { type: "range", id: "live-back", step: "any", value: "100", disabled: true });
   past.addEventListener("input", () => traces.lookBack(Number(past.value)));
   const follow = h("button", { type: "button", id: "follow", hidden: true, click: () => traces.lookBack(null) }, "Now");
   const place = h("output", { class: "hint" });
@@ -77,10 +77,11 @@ export const page: Page = (main, { notices, query }) => {
     warning,
     alarms.element,
     old,
+    quiet,
     h("div", { class: "tiles" }, slip.element, grip.element, soil.element, speedTile.element),
     setpoint.element,
     traces.element,
-    h("div", { class: "past" }, past, place, follow),
+    h("div", { class: "past" }, h("label", { for: "live-back" }, "Look back"), past, place, follow),
     said,
   );
 
@@ -118,6 +119,7 @@ export const page: Page = (main, { notices, query }) => {
       delay = 0;
       delete health.dataset["drops"];
       fill(said);
+      fill(quiet);
     }
     freshness();
   };
@@ -133,6 +135,7 @@ export const page: Page = (main, { notices, query }) => {
     main.classList.toggle("predicted", predicted);
     traces.late = connected && traces.held === null && silent > limit ? silent * played : 0;
     old.hidden = !isOld;
+    quiet.hidden = !quiet.textContent || !(feed.age("status") < STATUS_AGE);
     if (!isOld) return;
     setpoint.show(null); // an old one is no advice
     old.textContent =
@@ -163,6 +166,7 @@ export const page: Page = (main, { notices, query }) => {
     } else if (message.kind === "status") {
       const lost = Object.values(message.counts ?? {}).reduce((sum, one) => sum + (one["dropped"] ?? 0), 0);
       delay = message.delay ?? 0;
+      quiet.textContent = sentence(message.silent);
       health.dataset["drops"] = `${lost} dropped${message.delay === undefined ? "" : `, ${digits(1000 * message.delay, 2)} ms behind`}`;
     }
   }
@@ -184,7 +188,7 @@ export const page: Page = (main, { notices, query }) => {
     slip.set(...now.slip.shown);
     grip.set(...now.grip.shown);
     speedTile.set(...now.speed.shown);
-    alarms.check(now, event);
+    if (!ring.isPredicted) alarms.check(now, event);
   }
 
   pause.addEventListener("click", () => {
