@@ -166,10 +166,30 @@ class Reorder:
             row = self.pending[0]
             layout = self._layouts.get(row.parts) or self._streams_of(row)
             expired = now - row.arrival >= self.window
-            if not expired and not _complete(row.time, layout):
+            if not expired and not self._is_complete(row.time, layout):
                 break
             out.append(self._release(row, layout, expired))
         return out
+
+    def _is_complete(self, time: float, layout: _Layout) -> bool:
+        """Whether the first row lacks nothing that is due, and its channels were known (a new one may belong to others still to come)."""
+        present, absent, known = layout
+        for stream in present:
+            if time > stream.calm and stream.awaited(time, True):
+                return False
+        for stream in absent:
+            if stream.awaited(time, False) and not self._has_come(stream):
+                return False
+        return known
+
+    def _has_come(self, stream: Stream) -> bool:
+        """Whether the sample that is due is here, with a stamp behind the first row's: on a bus frames come a little sooner or later."""
+        latest, mine = stream.due_from + 1.5 * stream.period, stream.channels[0]
+        return any(
+            row.time <= latest and source == stream.source and mine in names
+            for row in self.pending[1:]
+            for source, names in row.parts
+        )
 
     def _streams_of(self, row: Pending) -> _Layout:
         """The streams that the row holds and those it lacks, and whether these are all its channels.
@@ -277,15 +297,3 @@ class Reorder:
             for one in state["pending"]
         ]
         self._recent = deque(((when, tuple(names)) for when, names in state["recent"]), maxlen=_RECENT)
-
-
-def _complete(time: float, layout: _Layout) -> bool:
-    """Whether the row lacks nothing that is due, and each of its channels was known (a new one may belong to others still to come)."""
-    present, absent, known = layout
-    for stream in present:
-        if time > stream.calm and stream.awaited(time, True):
-            return False
-    for stream in absent:
-        if stream.awaited(time, False):
-            return False
-    return known
