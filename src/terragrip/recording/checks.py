@@ -132,7 +132,8 @@ NOTHING_TOWED = (
 def remarks(columns: Collection[str]) -> list[str]:
     """Sentences on uses for which the columns of a table are not enough."""
     notes = []
-    unused = [c for c in columns if c != TIME and c not in LABELS and not is_channel(c)]
+    known = (TIME, "arrival", *LABELS)  # the second in a live record
+    unused = [c for c in columns if c not in known and not is_channel(c)]
     if unused:
         more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
         notes.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
