@@ -8,11 +8,13 @@ import math
 import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.columns import wheels_with
 from terragrip.live.message import EVENT, Message
 from terragrip.live.outputs import Row
+from terragrip.recording.columns import SINCE_1970
 
 if TYPE_CHECKING:
     from terragrip.live.service import Service
@@ -76,7 +78,9 @@ def table(service: Service) -> Any:
 
 
 def _seconds(time: float) -> str:
-    """An event's time; before the first sample there is none."""
+    """An event's time, of day where it counts from 1970; before the first sample there is none."""
+    if SINCE_1970 < time < 1e11:
+        return f"{datetime.fromtimestamp(time, UTC):%H:%M:%S UTC}"
     return f"{time:9.1f} s" if math.isfinite(time) else f"{'—':>9}  "
 
 

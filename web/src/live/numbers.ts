@@ -75,6 +75,9 @@ export function ageOf(feed: Feed, delay: number, speed: number, held: boolean) {
 
 export const seconds = (age: number): string => (Number.isFinite(age) ? `${age.toFixed(1)} s` : "ages");
 
+/** A time of samples: of day, where it counts from 1970. */
+export const instant = (time: number): string => (time > 1e8 && time < 1e11 ? `${new Date(1000 * time).toISOString().slice(11, 19)} UTC` : `${time.toFixed(1)} s`);
+
 /** The sources that are silent, as the service says it. */
 export const sentence = (silent: string[] = []): string => silent.join("; ").replace(/^./, (first) => first.toUpperCase());
 

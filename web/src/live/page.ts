@@ -9,7 +9,7 @@ import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitNamed, type Kind } from "../ui/units";
 import { Alarms } from "./alarms";
 import { Feed, of, type Said } from "./feed";
-import { ageOf, brief, eventNow, LINGER, oldSaid, reading, seconds, sentence, STATUS_AGE, WARNING } from "./numbers";
+import { ageOf, brief, eventNow, instant, LINGER, oldSaid, reading, seconds, sentence, STATUS_AGE, WARNING } from "./numbers";
 import { SetpointLine, type Setpoint } from "./setpoint";
 import { Traces, type Trace } from "./traces";
 
@@ -154,7 +154,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function tell(message: Said): void {
     if (message.source !== undefined && message.text !== undefined) {
-      said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` ${message.time.toFixed(1)} s`, message.text ? `: ${message.text}` : ""));
+      said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` ${instant(message.time)}`, message.text ? `: ${message.text}` : ""));
       while (said.children.length > 6) said.lastElementChild?.remove();
       if (message.kind in WARNING) warn(message.kind, message.text);
     } else if (message.kind === "setpoint") {
