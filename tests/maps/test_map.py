@@ -258,6 +258,23 @@ def test_change_between_days_is_significant_where_it_is_one() -> None:
     assert np.median(changes["difference"][east < 18]) == pytest.approx(-0.2 * REFERENCE, rel=0.05)
 
 
+@pytest.mark.parametrize(("share", "doubted"), [(0.04, True), (0.3, False)])
+def test_a_field_that_changed_as_a_whole_may_be_a_machine_whose_zeros_moved(
+    share: float, doubted: bool
+) -> None:
+    """Its torques are stated to 3 %: 4 % more everywhere on another day is no evidence of other ground, 30 % more is."""
+    days = []
+    for day, more in (("monday", 0.0), ("friday", share)):
+        one = drive(*lanes(8, 40, 2), noise=0.005, std=0.02)
+        one.about["vehicle"]["uncertainty"] = {"drive_torque_gain_common": 0.03}
+        for wheel in one.wheels:
+            one.columns[f"adhesion_{wheel}"] *= 1 + more
+        days.append((day, one))
+    made = map_of(days)
+    assert made.changes["adhesion"].significant.mean() > 0.5
+    assert any("adhesion: most cells changed" in note for note in made.notes) is doubted
+
+
 def test_an_uncertain_zero_of_slip_is_no_change_where_another_day_slips_less() -> None:
     way, days = lanes(6, 40, 2), []
     for slip in (0.1, 0.05):

@@ -108,7 +108,8 @@ def _by_soil(rows: Sequence[Row], curves: FleetCurves) -> Section:
         machines = str(len({row["vehicle"] for row in group}))
         listed.append((name, str(len(group)), machines, _hours(group), km, *_means(group), percent(best)))
     caption = (
-        "By the logs' own labels. Best slip: where the pooled curve's tractive efficiency is largest, at the soil's mean resistance"
+        "By the logs' own labels, also where the tool is still on other ground, which a log's own report leaves out. "
+        "Best slip: where the pooled curve's tractive efficiency is largest, at the soil's mean resistance"
         f" and the vehicles' mean tire resistance {number(curves.tire_resistance)}. No interval is given here, since machines differ: "
         "'terragrip advise' with soils.json gives one for a single machine."
     )

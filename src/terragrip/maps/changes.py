@@ -14,6 +14,9 @@ from terragrip.maps.columns import Columns
 
 Ints = npt.NDArray[np.int64]
 
+MOST = 0.5
+"""Share of the cells driven again whose change is one of the whole field."""
+
 
 @dataclass(frozen=True)
 class Changes(Columns):
@@ -61,3 +64,18 @@ def changes_of(passes: Cells, share: float = FALSE_DISCOVERIES, *, same_machine:
         significant(p, share), passes.run[first], passes.run[last],
         np.where(same, passes.time[last] - passes.time[first], np.nan),
     )  # fmt: skip
+
+
+def moved_zeros(changes: Changes, passes: Cells) -> str:
+    """A sentence where most cells changed between runs of one machine, by no more than its constants would cause if they moved between
+    the runs (two SDs of a difference); else ""."""
+    between = changes.first_run != changes.last_run
+    if not between.any():
+        return ""
+    shift, constant = float(np.median(changes.difference[between])), float(np.median(passes.constant))
+    if np.mean(changes.significant[between]) < MOST or abs(shift) > 2 * np.sqrt(2) * constant:
+        return ""
+    return (
+        f"most cells changed between the runs, by {shift:+.3f} in the median: the machine's constants (SD {constant:.3f}) would show that "
+        "too, had they moved between the runs. Set zeros and tyre pressures before each, or drive a stretch of hard ground in both."
+    )

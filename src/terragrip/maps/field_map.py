@@ -12,7 +12,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.maps.anomalies import Anomaly, anomalies_of
 from terragrip.maps.cells import CORRELATED, Cells, Pieces, cells_of, pieces_of
-from terragrip.maps.changes import Changes, changes_of
+from terragrip.maps.changes import Changes, changes_of, moved_zeros
 from terragrip.maps.filling import filled
 from terragrip.maps.lanes import lane_spacing
 from terragrip.maps.places import Places, has_positions, middle_of, places_of, zone_of
@@ -188,6 +188,8 @@ class MapMaker:
         changes = {
             name: found for name, all_ in passes.items() if len(found := changes_of(all_, same_machine=one))
         }
+        said = {name: moved_zeros(found, passes[name]) for name, found in changes.items() if one}
+        self.notes += [f"{name}: {sentence}" for name, sentence in said.items() if sentence]
         if not changes:
             self.notes.append("Every cell was driven once: there is no map of changes.")
         if self.settings.fill:
