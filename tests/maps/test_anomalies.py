@@ -9,8 +9,9 @@ pytest.importorskip("geopandas", reason="needs terragrip[geo]")
 
 from pyproj import Transformer
 
-from lane_drives import EARTH, drive, lanes, local_east
-from terragrip.maps import MapSettings, map_of
+from lane_drives import EARTH, REFERENCE, drive, lanes, local_east
+from terragrip.maps import FieldMap, MapSettings, map_of
+from terragrip.maps.anomalies import least_difference
 from terragrip.maps.layers import layer
 from terragrip.physics.adhesion import CURVES
 
@@ -96,3 +97,22 @@ def test_ground_driven_at_another_slip_is_no_anomaly_where_its_curve_may_bend_ot
     made = map_of([("a", one)], MapSettings(reference_slip=0.1))
     assert np.ptp(made.cells["adhesion"].value) > 0.1
     assert not made.anomalies["adhesion"]
+
+
+def test_a_map_says_from_which_difference_on_a_patch_is_found() -> None:
+    """Patches of nine cells in white noise: below half of that none is found; of three times it all are."""
+
+    def made(difference: float, seed: int) -> FieldMap:
+        def ground(east: np.ndarray, north: np.ndarray) -> np.ndarray:
+            inside = (np.abs(east - 20.5) < 1.5) & (np.abs(north - 10.5) < 1.5)
+            return 1.0 + np.where(inside, difference / REFERENCE, 0.0)
+
+        way = lanes(20, 40, 1)
+        return map_of([("a", drive(*way, a=ground, noise=0.02, std=0.02, seed=seed))], MapSettings(cell=1.0))
+
+    least = least_difference(made(0.0, 1).cells["adhesion"], [])
+    assert 0.0 < least < 0.1 * REFERENCE
+    found = [
+        [len(made(share * least, seed).anomalies["adhesion"]) for seed in range(3)] for share in (0.5, 3)
+    ]
+    assert found == [[0, 0, 0], [1, 1, 1]]

@@ -124,6 +124,8 @@ def summary(made: FieldMap) -> str:
     """Lines of text: the grid, each quantity over field and headland, anomalies, changes, notes."""
     import numpy as np
 
+    from terragrip.maps.anomalies import PATCH, least_difference
+
     runs = f"{len(made.runs)} run{'s' * (len(made.runs) != 1)}"
     around = " ".join(
         f"{abs(degrees):.3f}° {'NE'[k] if degrees >= 0 else 'SW'[k]}" for k, degrees in enumerate(made.middle)
@@ -143,6 +145,10 @@ def summary(made: FieldMap) -> str:
                 line += f"; {area} {middle:.3f} ({low:.3f} to {high:.3f})"
         found = made.anomalies.get(name, [])
         line += f"; {len(found)} anomal{'y' if len(found) == 1 else 'ies'}"
+        if np.isfinite(
+            least := least_difference(cells.where(driven), found) if name in made.anomalies else np.nan
+        ):
+            line += f" (hardly one of {PATCH} cells that differs by less than {least:.2g} can be found)"
         changes = made.changes.get(name)
         if changes is not None:
             line += f"; {int(changes.significant.sum())} of {len(changes)} cells driven again changed"

@@ -34,6 +34,8 @@ FREE = 0.25
 """Share of such a disc's cells that may be of patches."""
 ROUND = 1.6
 """Radii of a disc, beside a cell, to which its cells reach at most; those at the field's edge are cut off."""
+PATCH = 9
+"""Cells of a patch by which it is said what a map can show."""
 MEDIAN = 0.6745
 """Median size of a Gaussian variable of SD 1."""
 
@@ -87,6 +89,20 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     found = [_anomaly(patch, cells, tree, constants, null[_size(patch)]) for patch in patches]
     listed = significant(np.array([one.p for one in found]), share, 1)
     return sorted(compress(found, listed), key=lambda one: one.p)
+
+
+def least_difference(cells: Cells, found: list[Anomaly], size: int = PATCH) -> float:
+    """The difference from its surroundings from which a patch of `size` cells is told from chance on this map, beside those `found`; NaN
+    where the map is too small to have anomalies. A patch of which single cells do not stand out needs more."""
+    from scipy.spatial import cKDTree
+    from scipy.special import ndtri
+
+    if len(cells) < AROUND:
+        return math.nan
+    tree = cKDTree(np.column_stack([cells.column, cells.row]).astype(float))
+    constants = np.nan_to_num(cells.constants - _around(tree, tree.data, cells.value, cells.constants)[2])
+    usual, share, std = _elsewhere(size, [one.cells for one in found], cells, tree, constants)
+    return float(-ndtri(FALSE_DISCOVERIES / (2 * share * len(cells))) * usual * std)
 
 
 def significant(p: Floats, share: float, tests: int | None = None) -> Bools:
@@ -184,19 +200,21 @@ def _usual(score: Floats) -> tuple[float, float]:
 
 def _elsewhere(
     size: int, patches: list[Ints], cells: Cells, tree: Any, constants: Floats
-) -> tuple[float, float]:
-    """`_usual` of the differences, in their SDs, of discs of `size` cells from what is around them, `patches` left out."""
+) -> tuple[float, float, float]:
+    """`_usual` of the differences, in their SDs, of discs of `size` cells from what is around them, `patches` left out, and their usual
+    SD."""
     place = tree.data
     patch = np.zeros(len(place), dtype=bool)
-    patch[np.concatenate(patches)] = True
+    patch[[cell for one in patches for cell in one]] = True
     middles = np.unique(np.linspace(0, len(place) - 1, PLACES).astype(np.intp))
     distance, index = (
         x.reshape(len(middles), -1) for x in tree.query(place[middles], k=min(size, len(place)))
     )
     whole = distance[:, -1] < ROUND * math.sqrt(size / math.pi) + 1
     discs = index[whole & (patch[index].mean(axis=1) <= FREE)]
-    found = (_against(one, cells, tree, constants) for one in discs)
-    return _usual(np.array([(value - base) / std for value, base, std in found]))
+    found = np.array([_against(one, cells, tree, constants) for one in discs]).reshape(-1, 3)
+    value, base, std = found.T
+    return *_usual((value - base) / std), float(np.median(std)) if len(std) else math.nan
 
 
 def _against(patch: Ints, cells: Cells, tree: Any, constants: Floats) -> tuple[float, float, float]:
@@ -210,11 +228,13 @@ def _against(patch: Ints, cells: Cells, tree: Any, constants: Floats) -> tuple[f
     return value, _beside(patch, cells, tree, value), std
 
 
-def _anomaly(patch: Ints, cells: Cells, tree: Any, constants: Floats, null: tuple[float, float]) -> Anomaly:
+def _anomaly(
+    patch: Ints, cells: Cells, tree: Any, constants: Floats, null: tuple[float, float, float]
+) -> Anomaly:
     from scipy.special import ndtr
 
     value, base, std = _against(patch, cells, tree, constants)
-    usual, share = null
+    usual, share, _ = null
     p = 2 * share * ndtr(-abs(value - base) / (std * usual)) * len(cells)
     column, row = tree.data[patch].mean(axis=0) + 0.5
     return Anomaly(patch, float(column), float(row), value, base, value - base, std, float(p))
