@@ -77,33 +77,38 @@ def _regressed(
 
     Returns the robust losses (m,), x_j (m, soils), and the relative SDs (m,) of their means.
     """
-    soils, shared = int(soil.max()) + 1, common.shape[1]
-    own = np.arange(soils)
-    one = (soil[:, None] == own).astype(float)  # (n, soils): a level's term stands in its soil's column alone
-    crossed = (one[:, :, None] * common[:, None, :]).reshape(len(soil), -1)
+    soils, prior = int(soil.max()) + 1, _PRIOR[1] ** -2.0
     squared = (common[:, :, None] * common[:, None, :]).reshape(len(soil), -1)
-    center = np.r_[np.full(soils, _PRIOR[0]), np.zeros(shared)]
-    precision = np.r_[np.full(soils, _PRIOR[1] ** -2.0), np.maximum(common_std, 1e-6) ** -2.0]
-    values = np.tile(center, (len(form), 1))
-    normal = np.zeros((len(form), len(center), len(center)))
+    precision = np.diag(np.maximum(common_std, 1e-6) ** -2.0)
+    inverse, by_all = np.full((len(form), soils), _PRIOR[0]), np.zeros((len(form), common.shape[1]))
 
     def residual(inverse: Floats) -> Floats:
-        return np.abs(slip - form * inverse[:, soil] - values[:, soils:] @ common.T)
+        return np.abs(slip - form * inverse[:, soil] - by_all @ common.T)
 
+    def by_soil(values: Floats) -> Floats:
+        """Sums of values (m, n) over each soil: (m, soils)."""
+        return np.array([np.bincount(soil, row, soils) for row in values])
+
+    # A soil's term stands in its rows alone, so the normal equations are diagonal but for the terms that all share, which are solved first.
     for _ in range(_ROUNDS):
-        rest = residual(values[:, :soils])
+        rest = residual(inverse)
         noise = np.maximum(1.4826 * np.median(rest, axis=1, keepdims=True), 1e-4)
         weight = np.minimum(1.0, _HUBER * noise / np.maximum(rest, 1e-12)) / (noise**2 * repeats)
         weighted = weight * form
-        normal[:, own, own] = (weighted * form) @ one
-        normal[:, :soils, soils:] = (weighted @ crossed).reshape(-1, soils, shared)
-        normal[:, soils:, :soils] = np.swapaxes(normal[:, :soils, soils:], 1, 2)
-        normal[:, soils:, soils:] = (weight @ squared).reshape(-1, shared, shared)
-        covariance = np.linalg.inv(normal + np.diag(precision))
-        target = np.hstack([(weighted * slip) @ one, (weight * slip) @ common]) + precision * center
-        values = (covariance @ target[..., None])[..., 0]
-    inverse = np.clip(values[:, :soils], _LEAST, _MOST)
+        own, target = by_soil(weighted * form) + prior, by_soil(weighted * slip) + prior * _PRIOR[0]
+        crossed = np.stack([by_soil(weighted * term) for term in common.T], axis=2)
+        lead = crossed / own[:, :, None]
+        left = np.swapaxes(lead, 1, 2)
+        covariance = np.linalg.inv(
+            (weight @ squared).reshape(-1, *precision.shape) + precision - left @ crossed
+        )
+        by_all = (covariance @ ((weight * slip) @ common - (left @ target[..., None])[..., 0])[..., None])[
+            ..., 0
+        ]
+        inverse = target / own - (lead @ by_all[..., None])[..., 0]
+    inverse = np.clip(inverse, _LEAST, _MOST)
     counts = np.bincount(soil, minlength=soils) / len(soil)
     loss = np.mean(residual(inverse), axis=1)
-    spread = np.sqrt(counts @ covariance[:, :soils, :soils] @ counts)
+    shared = counts @ lead
+    spread = np.sqrt(counts**2 @ (1 / own).T + np.einsum("mj,mjk,mk->m", shared, covariance, shared))
     return loss, inverse, spread / (inverse @ counts)
