@@ -297,7 +297,15 @@ def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, fo
     page.wait_for_selector(".state:has-text('waits for the one before')")
     served.stop()
     page.wait_for_selector("text=does not respond; trying again")
+    page.route(
+        "**/assets/page-*.js", lambda route: route.abort("connectionrefused")
+    )  # also from the browser's cache
+    page.click("nav >> text=Fit")  # the bar said "Fit", and the folder stayed below it
+    page.wait_for_selector("text=This page could not be loaded")
+    page.unroute("**/assets/page-*.js")
     served.start()
+    page.wait_for_selector("#curve-list")
+    page.click("nav >> text=Folder")
     page.wait_for_function("() => document.querySelectorAll('.state.interrupted').length === 2")
     page.wait_for_function("() => document.getElementById('connection').textContent === ''")
     (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")

@@ -20,6 +20,7 @@ const main = document.getElementById("main") as HTMLElement;
 const bar = document.getElementById("bar") as HTMLElement;
 let leave: (() => void) | void;
 let opened = 0;
+let unloaded = false;
 
 function route(): { name: string; query: URLSearchParams } {
   const [path = "", query = ""] = location.hash.replace(/^#\/?/, "").split("?");
@@ -34,14 +35,21 @@ async function open(): Promise<void> {
   if (chosen.unlisted) fill(bar); // such a page lies over it, and its links would still be reached by Tab
   else drawBar(name);
   document.title = `${chosen.title} · Terragrip studio`;
-  const { page } = await chosen.load();
+  const page = await chosen.load().then((loaded) => loaded.page, () => missing);
   if (turn !== opened) return;
+  unloaded = page === missing;
   leave?.();
-  main.className = `page-${name}`;
+  main.className = `page-${unloaded ? "start" : name}`;
   fill(main);
   leave = page(main, { notices, query });
   if (!main.querySelector("h1")) main.prepend(h("h1", { class: "visually-hidden" }, chosen.title));
 }
+
+/** In place of a page that could not be loaded: no studio answers, or one of another version, which has other files. */
+const missing: Page = (main) => {
+  const reload = h("button", { type: "button", click: () => location.reload() }, "Reload");
+  main.append(h("p", { class: "bad", role: "alert" }, "This page could not be loaded. It opens when the studio responds again; if it was updated meanwhile, reload. ", reload));
+};
 
 function drawBar(current: string): void {
   const links = Object.entries(PAGES).filter(([, { unlisted }]) => !unlisted).map(([name, { title }]) =>
@@ -62,6 +70,7 @@ notices.on((notice) => {
   if (notice.kind !== "connection") return;
   const state = document.getElementById("connection");
   if (state) state.textContent = notice.up ? "" : "The studio does not respond; trying again …";
+  if (notice.up && unloaded) void open();
 });
 
 document.querySelector(".skip")?.addEventListener("click", (event) => {
