@@ -3,7 +3,7 @@
 import { get } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
-import { onUnits, unitFor } from "../ui/units";
+import { onUnits, unitFor, withUnit } from "../ui/units";
 
 interface Best {
   slip: number;
@@ -95,7 +95,7 @@ export class AdvicePanel {
     const share = unitFor("share");
     const force = unitFor("force");
     const bare = (value: number): string => (share.scale * value).toFixed(share.scale > 1 ? 1 : 3);
-    const slip = (value: number): string => `${bare(value)} ${share.name}`;
+    const slip = (value: number): string => withUnit(bare(value), share);
     const between = (one: Best): string => `${slip(one.slip)} (${bare(one.interval[0])} to ${bare(one.interval[1])})`;
     const pull = (ratio: number): string => `${digits(force.scale * weight * ratio, 3)} ${force.name}`;
     const rows: [string, string][] = [];

@@ -1,7 +1,7 @@
 /** The set-point of slip that a live service publishes: advice, and said to be no more. */
 
 import { digits, fill, h } from "../ui/dom";
-import { onUnits, unitFor } from "../ui/units";
+import { onUnits, unitFor, withUnit } from "../ui/units";
 
 export interface Setpoint {
   state: "follow" | "slow" | "stop";
@@ -22,7 +22,7 @@ export class SetpointLine {
     if (!given) return;
     const [rotation, share] = [unitFor("rotation"), unitFor("share")];
     const speeds = Object.entries(given.wheel_speed).map(([wheel, speed]) => `${wheel} ${(rotation.scale * speed).toFixed(rotation.decimals)}`);
-    const slip = `${digits(share.scale * given.slip, 3)} ${share.name}`;
+    const slip = withUnit(digits(share.scale * given.slip, 3), share);
     fill(this.element, h("strong", {}, "Set-point, advice only: "), `${given.state}${given.why ? ` (${given.why})` : ""}, slip up to ${slip}; wheels ${speeds.join(", ")} ${rotation.name}`);
   }
 }

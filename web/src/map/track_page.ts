@@ -15,7 +15,7 @@ import { oneAtATime, type Page } from "../ui/page";
 import { notHere, runsOf } from "../ui/runs";
 import { color, onTheme } from "../ui/theme";
 import { saveMenu, type Sheet } from "../ui/sheet";
-import { onUnits, unitOf } from "../ui/units";
+import { onUnits, unitOf, withUnit } from "../ui/units";
 import { sheetOf } from "./figure";
 import { isNamed, quantitiesOf, showLegend, soilAt, wordsOf, type Legend, type Quantity } from "./quantities";
 import { shade } from "./shade";
@@ -238,7 +238,7 @@ export const page: Page = (main, { notices, query }) => {
     const t = (track.data[0] as Float64Array)[i] as number;
     const v = track.data[3]?.[i];
     const event = eventAt(t);
-    readout.value = [`t ${run ? moment(run, t) : ""}`, v === undefined ? "" : `${asked?.title} ${digits(v * unit.scale)} ${unit.name}`, soilAt(run, t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
+    readout.value = [`t ${run ? moment(run, t) : ""}`, v === undefined ? "" : `${asked?.title} ${withUnit(digits(v * unit.scale), unit)}`, soilAt(run, t), event ? `${event.kind}${event.why ? `: ${event.why}` : ""}` : ""].filter(Boolean).join("   ");
   }
 
   charts.onCursor = mark;
