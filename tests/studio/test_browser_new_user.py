@@ -241,6 +241,13 @@ def test_of_several_vehicles_none_is_taken_for_the_logs(
     page.reload()  # the last choice is known by the work that was done
     page.wait_for_selector("#see-estimate:has-text('a-estimates-2.parquet')")
     assert page.input_value("#wizard-vehicle") == "robot.yaml"
+    rows = page.inner_text("#wizard-found .good")
+    (folder / "third.yaml").write_bytes((made / "vehicle.yaml").read_bytes())
+    pd.read_parquet(folder / "a.parquet").iloc[:3000].to_parquet(folder / "a.parquet")
+    page.click("#read-again")  # the page went on with the rows of the log before
+    page.wait_for_selector("#wizard-found:has-text('3,000 rows, ready to estimate')")
+    assert not rows.startswith("3,000")
+    assert page.locator("#wizard-vehicle option[value='third.yaml']").count() == 1
     page.goto(f"{served.url}/#/start")
     page.click("[data-key='do batch']")
     assert page.is_disabled("#job-go")

@@ -4,7 +4,7 @@ import type { Run } from "../drive/run";
 import { get, send, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
-import type { Context } from "../ui/page";
+import { oneAtATime, type Context } from "../ui/page";
 import { onceReleased } from "../ui/press";
 import { focusOn, refill } from "./focus";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
@@ -45,7 +45,9 @@ export class LogPage {
   private estimates = "";
   private hasAdhesion = true; // of the estimates
   private made = new Map<string, string>(); // by kind of job, what was made of the estimates
+  private read = ["", ""]; // the log, and its vehicle and profile, as they were when they were read
   readonly jobs: JobList;
+  readonly leave: () => void;
 
   constructor(
     main: HTMLElement,
@@ -67,11 +69,35 @@ export class LogPage {
       section("step-next", "4  Curve, ground, report", this.next),
       this.jobs.element,
     );
+    const renew = oneAtATime(() => this.renew());
+    const forget = notices.on((notice) => notice.kind === "folder" && void renew());
+    this.leave = () => {
+      forget();
+      this.jobs.leave();
+    };
     void this.open();
+  }
+
+  /** The folder has changed: what is said here must not be of files that are others now. */
+  private async renew(): Promise<void> {
+    await this.reload();
+    const select = document.getElementById("wizard-vehicle") as HTMLSelectElement | null;
+    const found = document.getElementById("wizard-found");
+    if (!select || !found) return; // still opening
+    const vehicles = this.of("vehicle");
+    if (vehicles.join("\n") !== [...select.options].map((one) => one.value).filter(Boolean).join("\n")) fill(select, offered(vehicles, this.vehicle, "choose the log's vehicle"));
+    if (this.version(this.vehicle, this.profile) !== this.read[1]) await this.inspect();
+    if (this.version(this.log) === this.read[0] || document.getElementById("read-again")) return;
+    found.prepend(h("p", { class: "bad", role: "alert" }, "The log has changed since it was read. ", h("button", { type: "button", id: "read-again", click: () => void this.open() }, "Read it again")));
+  }
+
+  private version(...paths: string[]): string {
+    return JSON.stringify(this.items.filter((item) => paths.includes(item.path)));
   }
 
   private async open(): Promise<void> {
     await this.reload();
+    this.read[0] = this.version(this.log);
     let last: Job | undefined; // estimate of this log: with its vehicle and profile one goes on
     for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) {
       if (this.items.some((item) => item.path === job.output) && this.keep(job) && job.kind === "estimate") last = job;
@@ -209,6 +235,7 @@ export class LogPage {
     const turn = ++this.looks;
     const method = (document.getElementById("wizard-method") as HTMLSelectElement).value || undefined;
     go.disabled = true;
+    this.read[1] = this.version(this.vehicle, this.profile);
     const nothing = !this.profile && !this.look?.ready;
     if (nothing) {
       fill(found, h("p", { class: "hint" }, this.look ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
@@ -336,7 +363,11 @@ export class LogPage {
 }
 
 function choice(id: string, paths: string[], chosen: string, none: string): HTMLSelectElement {
-  return h("select", { id }, h("option", { value: "" }, none), paths.map((path) => h("option", { value: path, selected: path === chosen }, path)));
+  return h("select", { id }, offered(paths, chosen, none));
+}
+
+function offered(paths: string[], chosen: string, none: string): HTMLElement[] {
+  return [h("option", { value: "" }, none), ...paths.map((path) => h("option", { value: path, selected: path === chosen }, path))];
 }
 
 function row(label: string, field: HTMLElement): HTMLElement {

@@ -32,8 +32,7 @@ export const page: Page = (main, context) => {
 };
 
 function openLog(main: HTMLElement, context: Context, log: string): () => void {
-  const opened = new LogPage(main, context, log);
-  return () => opened.jobs.leave();
+  return new LogPage(main, context, log).leave;
 }
 
 /** The vehicle maker on a page of its own, without a log. */
