@@ -158,6 +158,20 @@ def test_a_saved_curve_is_read_back_and_another_of_its_name_refused(client: Test
         assert client.post("/api/soils/save", json={**soil, "name": "other", **bad}).status_code == 422
 
 
+def test_a_replaced_soil_keeps_what_it_is_recognised_by(client: TestClient, folder: Path) -> None:
+    """A soil whose curve was saved anew lost its resistance, and drives on it were named unknown."""
+    before = json.loads((folder / "soils.json").read_text())["soils"]["grass"]
+    found = fit(client, path="estimates.parquet", soil="grass").json()
+    names = ("model", "parameters", "interval", "bins", "free", "clusters", "common_slip_sd")
+    curve = {name: found[name] for name in names if name in found}
+    sent = {"library": "soils.json", "name": "grass", "replace": True, **curve}
+    assert client.post("/api/soils/save", json=sent).status_code == 201
+    after = SoilLibrary.load(folder / "soils.json")["grass"].to_dict()
+    for kept in ("resistance", "spread", "signature", "slip_noise", "free", "clusters"):
+        assert after.get(kept) == before.get(kept), kept
+    assert after["resistance"]
+
+
 @pytest.mark.parametrize("path", ["soils.json", "estimates.parquet"])
 def test_soils_of_each_kind_of_file_are_served(client: TestClient, path: str) -> None:
     soils = client.get("/api/soils", params={"path": path}).json()

@@ -129,7 +129,7 @@ async function keep(state: State): Promise<void> {
     model: curve.model,
     parameters: curve.parameters,
     source: curve.source,
-    ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins } : {}),
+    ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins, clusters: fitted.clusters || null, common_slip_sd: fitted.common_slip_sd ?? null } : {}),
   };
   const store = (replace: boolean): Promise<unknown> => send("POST", "soils/save", { ...soil, replace });
   try {

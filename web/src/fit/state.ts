@@ -29,6 +29,7 @@ export interface FitResult {
   nrmse: number;
   bins: Bin[];
   clusters: number;
+  common_slip_sd?: number;
   identifiability: { condition: number; identifiable: boolean; effective: Parameters; twin: Parameters | null; sentence: string };
   notes: string[];
   /** Free parameters that stopped at an end of their range: the data do not fix them. */

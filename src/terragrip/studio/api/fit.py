@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -74,6 +75,10 @@ class SaveRequest(BaseModel):
     r2: FiniteFloat | None = None
     nrmse: FiniteFloat | None = None
     bins: list[dict[str, FiniteFloat]] = []
+    clusters: int | None = Field(None, ge=1, description="Draws that the interval comes from.")
+    common_slip_sd: FiniteFloat | None = Field(
+        None, ge=0, description="SD of the error of slip that the bins share."
+    )
     source: str = "studio"
     replace: bool = False
 
@@ -125,15 +130,25 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
 
 @router.post("/soils/save", status_code=201)
 def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
-    """Put a soil into a library, which is made where there is none."""
+    """Put a soil into a library, which is made where there is none. A soil that is replaced keeps what was measured beside its curve
+    (resistance, spread, roughness), by which a drive is recognised on it.
+    """
     target = studio.folder.new_file(wanted.library, (".json",))
     entry = wanted.model_dump(exclude={"library", "name", "replace"}, exclude_defaults=True)
     soil = soil_of(wanted.name, {"source": wanted.source, **entry}, wanted.library)
     with studio.own.saving():  # two pages that save at once keep both soils
         library = SoilLibrary.load(target) if target.exists() else SoilLibrary({})
+        if wanted.replace and soil.name in library:
+            soil = _with_measured(soil, library[soil.name])
         merged = library.merge(SoilLibrary({soil.name: soil}), "replace" if wanted.replace else "refuse")
         merged.write(target)
     return {"path": wanted.library, "soils": list(merged)}
+
+
+def _with_measured(soil: Soil, old: Soil) -> Soil:
+    """A soil's new curve, with what was measured beside the old one."""
+    kept = {key: old.fit[key] for key in ("slip_noise", "signature") if key in old.fit}
+    return replace(soil, resistance=old.resistance, spread=old.spread, fit={**soil.fit, **kept})
 
 
 def _plain(soil: Soil) -> dict[str, Any]:
