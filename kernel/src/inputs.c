@@ -4,6 +4,7 @@
 #define TG_LEAST_SAMPLES 4 /* before any can be called a spike */
 #define TG_PAUSE 10        /* intervals, beyond a gap: a longer silence is a pause */
 #define TG_CHATTER ((tg_real)2 / 3)
+#define TG_AHEAD 4 /* intervals that the change over one of them is continued at most: of two samples at nearly one instant it is their noise */
 
 /* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
  * torque's noise would shake omega more than the wheel ever does. */
@@ -57,7 +58,8 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
         } else {
             track(h, x, noise, interval, k->input_lag);
             h->calm = x;
-            h->bend = h->count > 1 ? tgi_square(x - before - h->rate * interval) : 0;
+            const tg_real ahead = TG_AHEAD * h->interval;
+            h->bend = h->count > 1 ? tgi_square(x - before - h->rate * (interval < ahead ? interval : ahead)) : 0;
             h->rate = (x - before) / interval;
             h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2; /* of a straight line since the last sample */
             h->fresh = 1;

@@ -66,3 +66,15 @@ def test_white_noise_that_the_file_understates_is_no_chatter() -> None:
     }
     _, spread, _ = errors(replace(made, recording=made.recording.with_channels(**noisy)))
     assert np.mean(spread) < 0.03
+
+
+def test_two_samples_at_nearly_one_instant_are_no_chatter() -> None:
+    """A bus that gives its last frame again, 1 us later with new noise: adhesion's spread stays what it was."""
+    plain = drive(20.0, rate=RATE).recording
+    time = np.insert(plain.time, 501, plain.time[500] + 1e-6)
+    doubled = replace(
+        plain, time=time, channels={name: np.insert(c, 501, c[501]) for name, c in plain.channels.items()}
+    )
+    spread = [estimate(one, robot())["adhesion_fl_std"][520:] for one in (plain, doubled)]
+    np.testing.assert_allclose(np.median(spread[1]), np.median(spread[0]), rtol=0.05)
+    assert np.max(spread[1]) < 1.5 * np.max(spread[0])
