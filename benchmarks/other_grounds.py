@@ -88,7 +88,7 @@ def machines(count: int, first: int, curves: tuple[str, ...] = tuple(RISES)) -> 
         yield Kind(kind.mass, curves[k % len(curves)], kind.sensors), seed
 
 
-def draw(kind: Kind, seed: int, rate: float) -> SimulationResult:
+def draw(kind: Kind, seed: int, rate: float, duration: float | None = None) -> SimulationResult:
     """A work drive on such ground; soils drawn about as widely as the saturating ones."""
     faster = RISES[kind.curve][1] if kind.curve in RISES else 0.0
 
@@ -116,4 +116,4 @@ def draw(kind: Kind, seed: int, rate: float) -> SimulationResult:
         patch.object(scenario, "CURVES", EVERY),
         patch.dict(family_soils.SOILS_OF, {"saturating": yielding if kind.curve == "yielding" else soil}),
     ):
-        return families.draw(Kind(kind.mass, "saturating", kind.sensors), seed, rate=rate)
+        return families.draw(Kind(kind.mass, "saturating", kind.sensors), seed, rate=rate, duration=duration)
