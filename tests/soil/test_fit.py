@@ -180,6 +180,14 @@ def test_a_curve_that_is_not_fitted_says_so():
             call()
 
 
+def test_an_intercept_is_drawn_with_its_own_curve():
+    """Rise and intercept err against each other: any rise with any intercept made the band of measured sand five times as wide."""
+    slip, mu, run = pairs(8, "effective", A=0.3, k=8.0, d=0.0)
+    curve = AdhesionCurve(intercept=True, bins=BinSettings(0.01, 0.2, 0.6)).fit(slip, mu - 0.05, run)
+    low, high = curve.band([0.25, 0.5])
+    assert np.ptp(curve.interval_["intercept"]) > np.max(high - low)
+
+
 def test_a_band_has_the_shape_of_its_slips():
     curve = AdhesionCurve(bootstrap=50).fit(*pairs(8, a=0.85))
     low, high = curve.band([[0.1, 0.2], [0.3, 0.4]])

@@ -182,7 +182,7 @@ class AdhesionCurve:
             np.percentile(values, [tail, 100 - tail], axis=0)
             for values in (
                 CURVES[self.model].value(s[None, :], {**held, **given}, intercept),
-                self._other_forms().value(s) + intercept,
+                self._other_forms().value(s) + self.parameters_.get(INTERCEPT, 0.0),
             )
         )
         low, high = np.minimum(own[0], other[0]), np.maximum(own[1], other[1])
