@@ -3,9 +3,10 @@
     python benchmarks/bench_checks.py [--machines 24] [--only NAME ...] [--write]
 
 The limits are those of recording/codes.py, pace.py, frozen.py, cut.py, turns.py, dropouts.py, stretches.py, copies.py, replays.py,
-rest.py, torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves, sides.py's _APART and _SPUN,
-torques.py's least thrust, plain_units.py's hour, those of level_shift.py, rescaled.py and leaps.py, and mechanics.py's stretch and
-offset. Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
+rest.py, torque_signs.py, rolling.py, turn_rates.py, forces.py, those of pitch.py for a zero that moves and its fewest samples, sides.py's
+_APART and _SPUN, torques.py's least thrust, plain_units.py's hour and empty machine, those of level_shift.py, rescaled.py and leaps.py,
+and mechanics.py's stretch and offset.
+Right logs are development drives of three chassis (sprung, rigid, rolling), in turn at the rate drawn, 100, 20 and 10 Hz, and
 the measured logs of ../shared/data; a false alarm is a log of them with a note. Mistakes are put into every third of the drives (torques
 without a sign into all logs that have negative ones); one is found where its own note comes.
 
@@ -47,20 +48,20 @@ LIMITS = {
     "turns": "SURE LEAST_TURN _CLEAR _SIZES _WIDE _OTHER _SURELY",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
     "copies": "_NOISY",
-    "rest": "_STILL _ROLLING_OUT _SHIFT _SURE _ALIKE",
+    "rest": "_STILL _ROLLING_OUT _SHIFT _SURE _ALIKE _HELD _STOPS _THRUST _ONE_WHEEL _SLOPE",
     "replays": "_CHANNELS _CHANGES",
     "torques": "_LEAST",
     "forces": "_CALM _SLOW _MOVING _SLIP _LEAST _STARTS _SURE _ALIKE _ACCELERATION _FORCE",
     "stretches": "LONG DRIVING _GAP _APART _LOOKS",
     "torque_signs": "_MOVING _STEADY _NEAR _DIPS _BRAKING _FEWEST _AS_HARD",
-    "pitch": "_LONG _MOVED _BEYOND",
+    "pitch": "_FEWEST _LONG _MOVED _BEYOND",
     "level_shift": "_STAYS",
-    "rescaled": "_LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
+    "rescaled": "_COARSEST _LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
     "leaps": "_LEAST _BEYOND _SURE _STEPS _HALF _REST",
     "mechanics": "_STRETCH _OFFSET",
-    "plain_units": "_ON_TIME",
+    "plain_units": "_ON_TIME _EMPTY",
     "sides": "_APART _SPUN",
-    "rolling": "_LIGHT _TYRE _LIGHTEST _PULLING _MOST _RADII_SURE _SLOWER_LEAST",
+    "rolling": "_LIGHT _RADIUS _TYRE _LIGHTEST _PULLING _MOST _RADII_SURE _SLOWER_LEAST _SURE _TURNING",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
 SHARES = {
@@ -207,6 +208,21 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
     )
     yield "radii 8 % small", "slower than the ground", log, with_radii(vehicle, 0.92)
     yield "radii 6 % large", "With hardly a torque", log, with_radii(vehicle, 1.06)
+    yield (
+        "gear ratio 1.25",
+        "With hardly a torque",
+        changed(log, "wheel_speed", by=lambda v: 1.25 * v),
+        vehicle,
+    )
+    zero = 0.05 * vehicle.mass * STANDARD_GRAVITY * float(np.mean(vehicle.wheel_radius)) / len(torques)
+    yield (
+        "torques' zeros .05",
+        "drive torques read the same",
+        changed(log, "drive_torque", by=lambda v: v + zero),
+        vehicle,
+    )
+    load = vehicle.mass * np.linspace(0.4, 0.1, len(time))
+    yield "mass of the load alone", "of the load alone", log.with_channels(mass=load), vehicle
     yield (
         "summer time",
         "summer time",

@@ -383,6 +383,7 @@ typedef struct {
     tg_real wheel_share[8];         /* wheel: part of its axle's load */
     tg_real wheel_side[8];          /* wheel, m left of the middle: its hub moves at v - side x yaw rate */
     tg_real wheel_ahead[8];         /* steered wheel, m ahead of the axle that does not steer: it points along its hub's way; else 0 */
+    tg_real receiver_ahead, receiver_side; /* m ahead of, left of what the ground speed counts for: it measures it there */
     tg_real lateral_share[8];       /* wheel, s^2/m: part of its axle's load it loses per m/s^2 to the left */
     tg_real center_of_gravity_height; /* m */
     tg_real hitch_height;           /* m */

@@ -35,6 +35,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
     tg_real wheel_variance[8];
     tg_real ground_variance;
+    tg_real turn_variance; /* of the ground speed, by what a turn adds to it at its receiver */
     tg_real doubt[9]; /* of the wheel speeds and the ground speed: variance beside the sensor's, of a spike */
     tg_real shared[9]; /* of the wheel speeds' and the ground speed's noise: variance that neighbouring steps share, and one step does not have */
     tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */

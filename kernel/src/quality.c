@@ -27,6 +27,21 @@ static void drop_repetitions(tg_estimator *e, const tg_sample *sample, tg_row *r
     }
 }
 
+/* A receiver that is not where the ground speed counts measures what the turn adds to it, too: that is taken off, and what the noise of
+ * both makes of it is a variance. */
+static void move_to_middle(const tg_estimator *e, tg_row *row)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real there = row->value[TG_GROUND_SPEED], seen = row->value[TG_YAW_RATE];
+    const tg_real yaw = !isnan(seen) ? seen : row->time - e->yaw_time > 1 ? 0 : e->yaw_rate, across = s->receiver_ahead * yaw;
+    row->turn_variance = 0;
+    if (yaw == 0 || isnan(there) || (across == 0 && s->receiver_side == 0)) return;
+    row->value[TG_GROUND_SPEED] = tgi_middle_of(s, there, yaw);
+    const tg_real along = tgi_max(tgi_fabs(row->value[TG_GROUND_SPEED] - s->receiver_side * yaw), s->standstill_speed);
+    const tg_real by_yaw = tgi_fabs(s->receiver_side) + s->receiver_ahead * s->receiver_ahead * tgi_fabs(yaw) / along;
+    row->turn_variance = tgi_square(by_yaw * s->noise[TG_YAW_RATE]) + tgi_square(s->noise[TG_GROUND_SPEED] * across / along);
+}
+
 /* Calibrated row with NaN for whatever is no measurement. The estimator is changed only when all numbers are finite or NaN. */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 {
@@ -43,6 +58,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
         if (c->limit[k] > 0 && isinf(sample->value[k])) return TG_NOT_FINITE;
     row->time = sample->time;
     if (c->holds) drop_repetitions(e, sample, row);
+    move_to_middle(e, row);
     for (int32_t k = TG_WHEEL_SPEED; k <= TG_GROUND_SPEED; k++) measured |= row->value[k] == row->value[k];
     row->outlier = outlier;
     row->measured = measured;

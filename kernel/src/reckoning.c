@@ -106,7 +106,7 @@ static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_rea
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q)
 {
     const tg_tuned *const k = &e->settings.tuned;
-    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->doubt[e->settings.machine.wheels];
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[e->settings.machine.wheels];
     if (!is_missing(e, row, dt, k->silence)) return;
     if (e->standing && e->slope.running) tgi_slope_correct(&e->slope, 0, tgi_square(e->settings.standstill_speed) * (1 + 2 * k->alike / dt));
     if (!goes) return;
@@ -145,7 +145,7 @@ static tg_real rim_of_speeds(const tg_estimator *e, const tg_row *row)
  * vehicle that stands has no speed. */
 void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
 {
-    row->ground_variance = e->constants.variance[TG_GROUND_SPEED];
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance;
     const tg_real usual = 2 * e->ground.interval, most = e->settings.gap, silence = tgi_max(e->settings.tuned.silence, usual < most ? usual : most);
     if (!is_missing(e, row, dt, silence) || e->speeds.seen[0] == 0 || e->speeds.open != 0) return;
     tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;

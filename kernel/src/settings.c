@@ -186,6 +186,7 @@ static tg_status check_numbers(const tg_settings *s)
                                 s->noise[TG_ACCELERATION_X]};
     if (!are_sound(&s->tuned, sizeof s->tuned, 1) || !are_sound(&s->uncertainty, sizeof s->uncertainty, 0)) return TG_NOT_POSITIVE;
     if (!are_sound(spreads, sizeof spreads, 0) || !are_sound(positive, sizeof positive, 1)) return TG_NOT_POSITIVE;
+    if (!tgi_finite(s->receiver_ahead) || !tgi_finite(s->receiver_side)) return TG_NOT_FINITE;
     if (!tgi_finite(w->warn) || !tgi_finite(s->prior_adhesion) || !tgi_finite(s->prior_resistance)) return TG_NOT_FINITE;
     for (int32_t k = 0; k < TG_SLOTS; k++) {
         if (!tgi_finite(s->offset[k])) return TG_NOT_FINITE;

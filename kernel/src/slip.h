@@ -15,6 +15,14 @@ TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
     return along < 0 ? -way : way;
 }
 
+/* Speed of the vehicle in its own direction, from the speed `there` of its receiver, whose place goes round with it at `yaw`. */
+TG_INLINE tg_real tgi_middle_of(const tg_settings *s, tg_real there, tg_real yaw)
+{
+    const tg_real across = s->receiver_ahead * yaw, square = there * there - across * across;
+    const tg_real along = across == 0 ? tgi_fabs(there) : square > 0 ? tgi_sqrt(square) : 0;
+    return (there < 0 ? -along : along) + s->receiver_side * yaw;
+}
+
 /* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
 TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
 {
@@ -31,7 +39,7 @@ TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real
 TG_INLINE tg_real tgi_turn_variance(const tg_settings *s, int32_t i, tg_real omega, tg_real v, tg_real rate)
 {
     if (rate == 0) return 0;
-    const tg_real hub = tgi_hub_of(v - s->wheel_side[i] * rate, s->wheel_ahead[i] * rate), radius = s->rolling_radius[i];
+    const tg_real hub = tgi_hub_of(tgi_middle_of(s, v, rate) - s->wheel_side[i] * rate, s->wheel_ahead[i] * rate), radius = s->rolling_radius[i];
     const tg_real change = tgi_slip_of(omega, hub, radius, s->standstill_speed).slip - tgi_slip_of(omega, v, radius, s->standstill_speed).slip;
     return change * change / 2;
 }

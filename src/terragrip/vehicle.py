@@ -31,6 +31,7 @@ from terragrip.vehicle_parts import (
     Overhang,
     Payload,
     Power,
+    Radar,
     Sensors,
     ToolLength,
     Uncertainty,
@@ -66,7 +67,9 @@ class Vehicle(Part):
     wheel: Wheel | None = None
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.0
     bearing_resistance: Bearing = 0.0
+    articulated: bool = False
     antenna: Antenna | None = None
+    radar: Radar | None = None
     payload: Payload | None = None
     power: Power | None = None
     working_width: Width | None = None
@@ -138,6 +141,12 @@ class Vehicle(Part):
                 f"{self.payload.x:g} m is far from between the axles, {self.wheelbase:g} m apart",
                 "count from the rear axle forward",
                 ("payload", "x"),
+            )
+        if self.articulated and (len(self.axles) < 2 or any(axle.steered for axle in self.axles.values())):
+            raise Fault(
+                "needs two axles, none of them steered",
+                "leave out 'steered': a vehicle that bends steers by its joint",
+                ("articulated",),
             )
         if self.driveline is not None and not self.knows_wheels:
             raise Fault("needs the wheels' radius and inertia", _ADD_WHEELS, ("driveline",))
@@ -243,8 +252,23 @@ class Vehicle(Part):
     def wheel_ahead(self) -> Floats:
         """How far ahead of what the vehicle turns about each steered wheel is (n,) [m]: of the axles that do not steer; 0 of the others."""
         steers = np.array([axle.steered for axle in self.axles.values()])
-        ahead = self.axle_to_rear - np.mean(self.axle_to_rear[~steers if not steers.all() else steers])
-        return _frozen(np.where(steers, ahead, 0.0)[self.wheel_axle])
+        return _frozen(np.where(steers, self.axle_to_rear - self.turns_about, 0.0)[self.wheel_axle])
+
+    @cached_property
+    def turns_about(self) -> float:
+        """Distance to the rear axle [m] of what the vehicle turns about, for which its ground speed counts: the middle of the axles that do
+        not steer, or of all if all do."""
+        steers = np.array([axle.steered for axle in self.axles.values()])
+        return float(np.mean(self.axle_to_rear[~steers if not steers.all() else steers]))
+
+    @cached_property
+    def receiver(self) -> tuple[float, float]:
+        """How far ahead of that, and to the left of the middle, the ground speed is measured [m]: by the ``antenna``, or by a ``radar``,
+        which reads the same ahead of it or behind. An ``articulated`` vehicle's axles go along their own middles: of the nearer."""
+        if self.radar is not None or self.antenna is None:
+            return 0.0, self.radar.y if self.radar else 0.0
+        ahead = self.antenna.x - (self.axle_to_rear if self.articulated else np.array([self.turns_about]))
+        return float(ahead[np.argmin(np.abs(ahead))]), self.antenna.y
 
     @cached_property
     def center_of_gravity_to_rear(self) -> float:

@@ -187,11 +187,17 @@ def _wheel_name(name: Any) -> str:
 
 
 class Antenna(Part):
-    """Where the position is measured, from the rear axle's centre: ``x`` forward, ``y`` to the left, ``z`` above the ground [m]."""
+    """Where position and speed are measured, from the rear axle's centre: ``x`` forward, ``y`` to the left, ``z`` above the ground [m]."""
 
     x: _Offset = 0.0
     y: _Offset = 0.0
     z: _Offset = 0.0
+
+
+class Radar(Part):
+    """A sensor of the ground speed that looks along the body, ``y`` [m] to the left of its middle."""
+
+    y: _Offset = 0.0
 
 
 class Payload(Part):

@@ -13,6 +13,7 @@ from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.vehicle_sizes import size_warnings
 from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"
@@ -28,7 +29,7 @@ class ByEngine:
         self._whole = whole
         self.machine = DrivenMachine.of_log(whole, original, reference)
         beside = tuple(note for note in reference.notes if note != WHAT_IS_MISSING)
-        self.notes = (*self.machine.notes, *beside)
+        self.notes = (*size_warnings(original), *self.machine.notes, *beside)
         self._waiting: deque[DrivelineTorque] = deque()
 
     def log(self, log: LogBlocks) -> LogBlocks:

@@ -280,13 +280,17 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
     for key, point in (("antenna", vehicle.antenna), ("payload", vehicle.payload)):
         if point is not None:
             data[key] = {**data[key], "x": point.x - rear}
+    if (
+        vehicle.antenna is not None
+    ):  # its wheels stand where the machine does not turn about: only what is beside them counts
+        data["radar"] = {"y": vehicle.receiver[1]}
     if len(groups) > 1:
         data["wheelbase"] = groups[0][0] - rear
         if data["wheelbase"] < 0.1 * float(
             np.ptp(position)
         ):  # the groups are at one place: nothing shifts load between them
             data |= {"wheelbase": 1.0, "center_of_gravity_height": 0.0, "hitch_height": 0.0}
-    for key in ("wheel", "track", "driveline", *(("wheelbase",) if len(groups) == 1 else ())):
+    for key in ("wheel", "track", "articulated", "driveline", *(("wheelbase",) if len(groups) == 1 else ())):
         data.pop(key, None)
     return data
 

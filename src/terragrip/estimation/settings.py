@@ -167,9 +167,10 @@ def _deflection(wheel: Wheel, radius: float, load: float) -> float:
 
 
 def put_axles(settings: Any, vehicle: Vehicle) -> None:
-    """Write into a tg_settings the axles, their loads and levers, and the machine's length."""
+    """Write into a tg_settings the axles, their loads and levers, the machine's length, and where its ground speed is measured."""
     levers, mass = load_levers(vehicle.axle_to_rear), vehicle.axle_mass
     settings.axles = len(vehicle.axle_names)
+    settings.receiver_ahead, settings.receiver_side = vehicle.receiver
     for k in range(len(mass)):
         settings.load_share[k] = mass[k] / mass.sum()
         settings.load_transfer[k] = levers[k]

@@ -9,6 +9,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.estimation.rims import Rim, rims_of
+from terragrip.physics.slip import middle_speed
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
@@ -21,6 +22,7 @@ _MOVING = 0.1  # m/s
 _WINDOW = 2.0  # s
 _TURNING = 0.04  # relative difference of the rims from side to side
 _MUCH = 0.1  # share of the driving
+_MOVED = 0.02  # share of the ground speed, and of the driving
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,35 @@ class ShownTurn:
 
 
 def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownTurn | None, list[str]]:
-    """The rate of turn by the positions, where no sensor measures how fast the machine turns, and a sentence on it.
+    """The rate of turn by the positions, where no sensor measures how fast the machine turns, and sentences on it and what it changes.
 
     ``sample``: rows of the log, by which it is judged whether the machine turned where nothing shows how fast.
     """
+    turn, notes = _turn_in(log, sample, vehicle)
+    yaw = sample.channels.get(_YAW_RATE) if turn is None else turn.over(sample)
+    return turn, [*notes, *_at_the_antenna(sample, vehicle, yaw)]
+
+
+def _at_the_antenna(sample: Recording, vehicle: Vehicle, yaw: Floats | None) -> list[str]:
+    """A sentence where much is taken off the ground speed since it is measured at the vehicle file's antenna."""
+    ground, (ahead, side) = sample.channels.get("ground_speed"), vehicle.receiver
+    if ground is None or yaw is None or vehicle.antenna is None or vehicle.radar is not None:
+        return []
+    moved = np.abs(middle_speed(ground, yaw, ahead=ahead, side=side) - ground) > _MOVED * np.abs(ground)
+    driving = np.isfinite(yaw) & (np.abs(ground) > _MOVING)
+    if not driving.any() or np.mean(moved[driving]) < _MOVED:
+        return []
+    return [
+        f"The ground speed is taken as measured at the antenna, {ahead:.3g} m ahead of what the vehicle turns about and {side:.3g} m to "
+        "its left: what turns add to it there is taken off. If a radar measures it, write 'radar: {y: 0 m}' in the vehicle file."
+    ]
+
+
+def _turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownTurn | None, list[str]]:
+    """The rate of turn, and a sentence on it."""
     channels = sample.channels
     rims = rims_of(vehicle, channels)
-    if not any(rim.side or rim.ahead for rim in rims):
+    if not any(rim.side or rim.ahead for rim in rims) and vehicle.receiver == (0.0, 0.0):
         return None, []
     unseen = _unseen_turns(sample, rims)
     if not {"latitude", "longitude"} <= set(channels) or (_YAW_RATE in channels and not unseen):

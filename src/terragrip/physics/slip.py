@@ -43,6 +43,19 @@ def slip(
     return np.where(moving, change, np.nan)
 
 
+def middle_speed(
+    there: ArrayLike, yaw_rate: ArrayLike, *, ahead: float = 0.0, side: float = 0.0
+) -> NDArray[Any]:
+    """Speed along the vehicle [m/s] of the middle that it turns about, from that of a receiver (rigid body), the broadcast shape.
+
+    ``there``: the receiver's speed √((v - side yaw_rate)² + (ahead yaw_rate)²) [m/s], of the sign of the travel; ``yaw_rate`` [rad/s], left
+    positive; ``ahead``, ``side`` [m]: where it is, to the left positive.
+    """
+    speed, yaw = np.asarray(there), np.asarray(yaw_rate)
+    along = np.sqrt(np.maximum(speed**2 - (ahead * yaw) ** 2, 0.0))
+    return np.asarray(np.copysign(along, speed) + side * yaw)
+
+
 def hub_speed(along: ArrayLike, across: ArrayLike) -> NDArray[Any]:
     """Speed of the hub of a steered wheel, which points along its way [m/s, of the sign of ``along``], any shape.
 

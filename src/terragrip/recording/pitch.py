@@ -8,6 +8,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.level_shift import step_of
+from terragrip.recording.ranks import median
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -20,6 +21,7 @@ _ALIKE = 0.7  # correlation from which two signals are proportional
 _SURE = 3.0  # standard errors
 _SCALE = 1.3  # an accelerometer's own scale is 2 % off at most
 _LATE = 0.1  # s, surely beyond it: filters; and half a window of slow samples
+_FEWEST = 5  # samples of a window, of which the mean is that of its middle (2 of 120 right drives at 1 and 2 Hz had a lag)
 _FAR = 1.0  # windows: beyond it, the first order does not hold
 _BLOCKS = 20  # of windows, for the jackknife: with half as many, right logs had lags of 4.9 standard errors (299 drives; now 3.1)
 _LONG = 20  # windows before and after a zero moves
@@ -80,7 +82,10 @@ def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[s
 
 def _late_warnings(recording: Recording, means: Means, climb: Floats, observed: Floats) -> list[str]:
     """A pitch that is late: to first order the measured climb is the pitch and its rate times the lag."""
-    plain = STANDARD_GRAVITY * window_means(np.sin(recording.channels["pitch"]), means.place, means.count)
+    pitch = recording.channels["pitch"]
+    if _FEWEST * median(np.diff(recording.time[np.isfinite(pitch)])) > means.length:
+        return []
+    plain = STANDARD_GRAVITY * window_means(np.sin(pitch), means.place, means.count)
     rate = np.r_[np.nan, (plain[2:] - plain[:-2]) / (2 * means.length), np.nan][means.rows]
     design = np.column_stack([np.ones(len(observed)), climb, rate, observed])
     design = design[np.isfinite(design).all(axis=1)]

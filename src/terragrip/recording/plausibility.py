@@ -11,7 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from terragrip.arrays import Floats
+from terragrip.physics.slip import middle_speed
 from terragrip.recording.axles import axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings
@@ -38,6 +41,7 @@ from terragrip.recording.torques import torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
 from terragrip.recording.turns import exchange_warnings
+from terragrip.recording.vehicle_sizes import size_warnings
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
@@ -90,8 +94,19 @@ class _Log:
         return self.any_vehicle
 
     @cached_property
-    def rows(self) -> Recording:
+    def as_measured(self) -> Recording:
+        """The rows with the ground speed where its receiver is, as that of the positions."""
         return averaged(self.whole, _FINEST)
+
+    @cached_property
+    def rows(self) -> Recording:
+        """The rows with the ground speed of what the vehicle turns about, which the wheels go with."""
+        ahead, side = (0.0, 0.0) if self.any_vehicle is None else self.any_vehicle.receiver
+        ground = self.as_measured.channels.get("ground_speed")
+        if ground is None or self.turn is None or not (ahead or side):
+            return self.as_measured
+        middle = middle_speed(ground, np.nan_to_num(self.turn), ahead=ahead, side=side)
+        return self.as_measured.with_channels(ground_speed=middle)
 
     @cached_property
     def track(self) -> Track | None:
@@ -99,7 +114,7 @@ class _Log:
 
     @cached_property
     def turn(self) -> Floats | None:
-        return shown_turn(self.rows, self.track)
+        return shown_turn(self.as_measured, self.track)
 
     @cached_property
     def sides(self) -> tuple[list[str], list[str]]:
@@ -149,7 +164,7 @@ _EACH = (
         lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
         (*_SPEEDS, "signs", "motion", "acceleration", "frozen", "dropouts"),
     ),
-    Check("rescaled", lambda log: rescaled_warnings(log.rows, log.vehicle, log.turn, log.track), _WAY),
+    Check("rescaled", lambda log: rescaled_warnings(log.as_measured, log.vehicle, log.turn, log.track), _WAY),
     Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
     Check("uneven torques", lambda log: log.sides[1], (*_WAY, "rescaled")),
     Check("drive train", lambda log: drive_train_warnings(log.rows), _WAY, needs_wheels=False),
@@ -157,7 +172,7 @@ _EACH = (
     Check(
         "positions",
         lambda log: position_warnings(
-            log.rows, log.track, wheels_agree=log.knows_wheels and not any(map(log.found, _SPEEDS))
+            log.as_measured, log.track, wheels_agree=log.knows_wheels and not any(map(log.found, _SPEEDS))
         ),
         _WAY,
         needs_wheels=False,
@@ -215,6 +230,7 @@ _EACH = (
     Check("mass", lambda log: mass_warnings(log.rows, log.any_vehicle), needs_wheels=False),
     Check("codes", lambda log: log.codes, needs_wheels=False),
     Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
+    Check("vehicle", lambda log: size_warnings(log.any_vehicle), needs_wheels=False),
     Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),
 )
 _ALL = tuple(check.name for check in _EACH)

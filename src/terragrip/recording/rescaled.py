@@ -28,6 +28,7 @@ _TORQUE = 0.25  # the same, of torques (.30 with three times the scatter, of 222
 _BEYOND_SPEED, _BEYOND_TORQUE = 4.0, 3.0  # standard deviations of a window
 _EVEN = 0.3  # of the pace: rims beyond spin, or stand
 _PULLING = 0.05  # of the axle's load
+_COARSEST = 0.5  # s between samples: further apart nothing shows that a scale changed at once, and not a soil
 _GAP, _SPAN = 0.1, 0.5  # s, and one and three samples: between, a scale has changed
 _SHARE = 0.6  # of the step that is there at once
 
@@ -109,6 +110,8 @@ def _instant(time: Floats, ratio: Floats, when: Floats, at: int, size: float) ->
     first, last = when[max(at - 2, 0)] - WINDOW, when[min(at + 1, len(when) - 1)] + WINDOW
     rows = (time > first) & (time < last)
     spacing = median(np.diff(time[rows])) if rows.sum() > 2 else WINDOW
+    if spacing > _COARSEST * (1 + 1e-6):
+        return None
     return instant_of(
         time[rows], ratio[rows], size, gap=max(_GAP, spacing), span=max(_SPAN, 3 * spacing), share=_SHARE
     )

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.arrays import Floats
+from terragrip.arrays import Bools, Floats
+from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import side_differences, straight_rows
@@ -38,6 +39,8 @@ _RADII_SURE, _SLOWER_LEAST = (
     4.0,
     0.04,
 )  # to so many of the file's standard deviations, and a receiver's errors
+_SURE = 3.0  # standard errors of the receiver's noise: at 1 Hz a stretch has five of its samples
+_TURNING = 0.1  # of the hub's speed, that a length times the rate of turn comes to
 
 
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
@@ -142,6 +145,9 @@ def slower_warnings(
     least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     stated = vehicle.uncertainty.wheel_radius
     slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
+    ground = recording.channels["ground_speed"]
+    heard = np.isfinite(ground)
+    noise = vehicle.sensors.ground_speed or white_noise(recording.time[heard], ground[heard]) or 0.0
     found: dict[str, tuple[float, float]] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
@@ -151,7 +157,11 @@ def slower_warnings(
         hub, thrust = means.speed - slowed[wheel], means.of(torque) / radius
         rows = (hub - rim > slower * hub) & (thrust > least) & usable
         stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
-        if stretch:
+        if stretch is None:
+            continue
+        within = (when >= stretch[0]) & (when <= stretch[1])
+        samples = heard & (np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2)
+        if np.mean((hub - rim - slower * hub)[within]) > _SURE * noise / np.sqrt(samples.sum()):
             found[wheel] = stretch
     if not found:
         return []
@@ -164,7 +174,20 @@ def slower_warnings(
     return [
         f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
         f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
+        + ("" if turn is None else _by_a_turn(vehicle, means, turn, (when >= first) & (when <= last)))
     ]
+
+
+def _by_a_turn(vehicle: Vehicle, means: Means, turn: Floats, within: Bools) -> str:
+    """What else may explain rims that go slower than their hubs in windows (n,) of a turn: a ground speed measured elsewhere."""
+    length = max(vehicle.wheelbase or 0.0, vehicle.track or 0.0)
+    share = median(np.abs(means.of(turn) * length / means.speed)[within])
+    if vehicle.antenna is not None or vehicle.radar is not None or share < _TURNING:
+        return ""
+    return (
+        " The vehicle turns there: if ground_speed is measured ahead of its rear axle or beside its middle, write where ('antenna' in "
+        "the vehicle file)."
+    )
 
 
 def _inner(recording: Recording, vehicle: Vehicle, means: Means) -> Floats:

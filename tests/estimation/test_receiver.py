@@ -1,0 +1,107 @@
+"""A ground speed that is measured away from what the vehicle turns about: what a turn adds to it there is taken off (made log)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.estimation import TractionEstimator, estimate
+from terragrip.recording import Recording, unit_warnings
+from terragrip.vehicle import Vehicle
+
+WHEELS = ("fl", "fr", "rl", "rr")
+RADIUS, TRACK, LENGTH, SLIP, G = 0.8, 1.8, 2.8, 0.05, 9.80665
+
+
+def vehicle(*, steered: bool = False, **more: object) -> Vehicle:
+    axles = {
+        "front": {"mass": 2500, "wheels": ["fl", "fr"], "steered": steered},
+        "rear": {"mass": 2500, "wheels": ["rl", "rr"]},
+    }
+    sizes = {"mass": 5000, "wheelbase": LENGTH, "track": TRACK, "center_of_gravity_height": 0.0}
+    return Vehicle.from_dict({**sizes, "axles": axles, "wheel": {"radius": RADIUS, "inertia": 40}, **more})
+
+
+def circles(ahead: float, side: float, *, steered: bool = False, radar: bool = False) -> Recording:
+    """At 1.5 m/s straight on and round curves of 4 m to either side, every wheel at a slip of 5 %, 20 Hz; the receiver ``ahead`` of the
+    axle that does not steer [m], and ``side`` to the left."""
+    rng, time = np.random.default_rng(2), np.arange(0, 90, 0.05)
+    yaw = np.convolve(
+        np.where(time % 30 > 18, 0.375 * np.where(time % 60 > 30, 1, -1), 0.0), np.ones(40) / 40, "same"
+    )
+    there = 1.5 - side * yaw if radar else np.hypot(1.5 - side * yaw, ahead * yaw)
+    columns = {"time": time, "ground_speed": there + 0.01 * rng.standard_normal(len(time))}
+    columns["angular_velocity_z"] = yaw + 0.002 * rng.standard_normal(len(time))
+    for wheel in WHEELS:
+        y = TRACK / 2 if wheel.endswith("l") else -TRACK / 2
+        hub = np.hypot(1.5 - y * yaw, LENGTH * yaw if steered and wheel.startswith("f") else 0.0)
+        columns[f"wheel_speed_{wheel}"] = hub / (1 - SLIP) / RADIUS + 0.005 * rng.standard_normal(len(time))
+        columns[f"drive_torque_{wheel}"] = RADIUS * 1250 * G * 0.06 + 10 * rng.standard_normal(len(time))
+    return Recording.from_frame(columns)
+
+
+def off_in_turns(log: Recording, machine: Vehicle) -> float:
+    """The largest error of any wheel's median slip in turns to either side."""
+    found = estimate(log, machine)
+    turning = [(sign * log.channels["angular_velocity_z"] > 0.3) & (log.time > 10) for sign in (1, -1)]
+    return max(abs(float(np.median(found[f"slip_{w}"][rows])) - SLIP) for w in WHEELS for rows in turning)
+
+
+MACHINES = {
+    "antenna of a tractor": (2.0, 0.4, {"antenna": {"x": 2.0, "y": 0.4}}, {"steered": True}),
+    "antenna over a joint": (LENGTH / 2, 0.0, {"antenna": {"x": LENGTH / 2}, "articulated": True}, {}),
+    "antenna on a front frame": (0.9, 0.0, {"antenna": {"x": LENGTH + 0.9}, "articulated": True}, {}),
+    "antenna of a skid-steered machine": (0.9, 0.0, {"antenna": {"x": LENGTH / 2 + 0.9}}, {}),
+    "radar": (2.0, 0.6, {"antenna": {"x": 1.0}, "radar": {"y": 0.6}}, {"radar": True}),
+}
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("torques", [True, False])
+def test_what_a_turn_adds_to_the_ground_speed_is_taken_off(name: str, torques: bool) -> None:
+    ahead, side, where, how = MACHINES[name]
+    log = circles(ahead, side, **how)
+    if not torques:
+        log = replace(log, channels={n: v for n, v in log.channels.items() if "torque" not in n})
+    layout = {"steered": how.get("steered", False)}
+    assert off_in_turns(log, vehicle(**layout, **where)) < 0.012
+    assert off_in_turns(log, vehicle(**layout)) > 0.02
+
+
+def test_a_right_log_of_such_a_receiver_is_not_accused_and_one_without_its_place_says_what_to_write() -> None:
+    log = circles(2.0, 0.4, steered=True)
+    machine = {"steered": True, "uncertainty": {"wheel_radius": 0.005}}
+    assert not unit_warnings(log, vehicle(**machine, antenna={"x": 2.0, "y": 0.4}))
+    assert any("'antenna' in the vehicle file" in note for note in unit_warnings(log, vehicle(**machine)))
+    notes = estimate(log, vehicle(**machine, antenna={"x": 2.0, "y": 0.4})).notes
+    assert any("taken as measured at the antenna, 2 m ahead" in one for one in notes)
+
+
+def test_samples_and_snapshots_give_the_digits_of_the_log() -> None:
+    log = circles(2.0, 0.4, steered=True)
+    whole = estimate(log, vehicle(steered=True, antenna={"x": 2.0, "y": 0.4}))
+    one = TractionEstimator.for_recording(log, vehicle(steered=True, antenna={"x": 2.0, "y": 0.4}))
+    for k in range(500):
+        if k == 450:  # in a turn
+            one = TractionEstimator.restore(one.snapshot())
+        found = one.update({"time": log.time[k], **{n: float(v[k]) for n, v in log.channels.items()}})
+        assert found["slip_rl"] == whole["slip_rl"][k]
+
+
+def test_an_articulated_vehicle_has_two_axles_and_none_that_steers() -> None:
+    with pytest.raises(InputError, match="articulated"):
+        vehicle(steered=True, articulated=True)
+
+
+def test_wheels_filled_in_from_the_ground_speed_show_no_turn() -> None:
+    """Their axle halved what the rims showed of a turn, and the track was named as wrong."""
+    log = circles(0.0, 0.0)
+    free = {f"wheel_speed_{w}": log.channels["ground_speed"] / RADIUS for w in ("fl", "fr")}
+    kept = {n: v for n, v in log.channels.items() if n not in ("drive_torque_fl", "drive_torque_fr")}
+    data = vehicle().to_dict()
+    data["axles"]["front"]["driven"] = False
+    notes = unit_warnings(replace(log, channels=kept | free), Vehicle.from_dict(data))
+    assert not [note for note in notes if "hubs differ" in note]
