@@ -65,13 +65,15 @@ tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive)
     return tgi_square(e->settings.ground_speed_delay * rate_of(e, drive));
 }
 
-/* What the filter has not followed of a disagreement between its model and the sensor, either of which may be right: the mean product of
- * neighbouring innovations, less what chance makes of it. */
+/* What the filter has not followed of a disagreement between its model and the sensor: the mean product of neighbouring innovations, less
+ * what chance makes of it. Either may be wrong: the model by the filter's own weight, K of the ground speed, and then all but 1 - K of it is
+ * corrected; else the sensor. At 2 Hz, where forces predict the speed badly, K is near 1. */
 tg_real tgi_alike_variance(const tg_estimator *e)
 {
     const tgi_slow_speed *const s = &e->slow_speed;
     if (!(s->alike > 0)) return 0;
-    return tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
+    const tg_real share = e->constants.variance[TG_GROUND_SPEED] / s->expected, less = share < 1 ? share : 1; /* 1 - K */
+    return less * (1 + less * (1 - less)) * tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
 }
 
 /* That, and, while the speed changes, the age of a sample. */

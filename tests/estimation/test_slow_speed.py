@@ -96,3 +96,14 @@ def test_a_sample_after_an_age_has_a_finite_interval() -> None:
         values = {f"wheel_speed_{w}": 3.0 + time % 1 for w in vehicle.wheels}
         out = estimator.update({"time": time, "ground_speed": 0.9 + time % 1, **values})
     assert not np.isinf(out.ground_speed_std)
+
+
+def test_forces_that_predict_badly_are_not_taken_for_an_error_of_the_receiver():
+    """At 2 Hz the filter's gain is nearly 1: its error is about that of a sample, and so must be the one it states."""
+    result = draw(Kind("robot", "saturating", "plain"), 3, rate=2.0, duration=120.0)
+    found = estimate(result.recording, result.vehicle)
+    speed = result.truth["true_ground_speed"].to_numpy()
+    moving = found["ground_speed"] > 0.1
+    error = np.abs(found["ground_speed"] - speed)[moving] / found["ground_speed_std"][moving]
+    assert np.sqrt(np.mean(error**2)) > 0.7  # .63 before the gain counted
+    assert np.mean(error <= 1.96) > 0.9
