@@ -70,6 +70,8 @@ class SpeedsFilter:
         """Variance of the ground speed beside the covariance: of an error that no stop has shown, and of a reckoned one."""
         chance = SURE * self.expected / np.sqrt(self.pairs) if self.pairs else 0.0
         alike = max(self.alike - chance, 0.0) if self.alike > 0 else 0.0
+        left = min(self.noise[0] ** 2 / self.expected, 1.0) if alike else 0.0  # 1 - gain
+        alike *= left * (1 + left * (1 - left))
         return (SLOW_SHARE * self.noise[0]) ** 2 + alike + max(self.reckoned - self.covariance[0, 0], 0.0)
 
     def __post_init__(self) -> None:
