@@ -136,7 +136,6 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
         ),
         (lambda c: {**c, "time": 1.7e15 + 1e6 * c["time"]}, "column time: is 1.7e+15 s, past the year 5000: since 1970 in us?"),
         (lambda c: spoilt(c, "drawbar_force", 16, -np.inf), "column drawbar_force, row 17 (time 0.16 s): is infinite"),
-        (lambda c: spoilt(c, "drawbar_force", 16, 1.8e200), "column drawbar_force, row 17 (time 0.16 s): is 1.8e+200, which"),
         (lambda c: {**c, "ground_speed": np.full(6000, np.nan)}, "column ground_speed: has no value"),
         (lambda c: {**c, "drawbar_force": np.full(6000, np.nan)}, "column drawbar_force: has no value"),
         (

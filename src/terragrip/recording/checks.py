@@ -237,15 +237,13 @@ def _way_out(back: float, time: Floats, row: int) -> str:
 def refuse_infinite(
     name: str, values: Floats, time: Floats, source: str | None, *, first_row: int = 0
 ) -> None:
-    """Raise InputError at the first value of a channel that is infinite, or so large that its square would be."""
-    if len(beyond := np.flatnonzero(np.abs(values) > _LARGEST)):
-        where, value = place(name, beyond[0], time, first_row=first_row), values[beyond[0]]
-        problem = "is infinite" if np.isinf(value) else f"is {value:.3g}, which nothing measures"
-        raise InputError(problem, file=source, place=where, hint="leave the cell empty instead")
-
-
-_LARGEST = 1e150
-"""Loggers write the largest double where nothing was measured."""
+    """Raise InputError at the first infinite value of a channel."""
+    if np.isfinite(values).all():
+        return
+    infinite = np.flatnonzero(np.isinf(values))
+    if len(infinite):
+        where = place(name, infinite[0], time, first_row=first_row)
+        raise InputError("is infinite", file=source, place=where, hint="leave the cell empty instead")
 
 
 PLACES = {"latitude": 90.0, "longitude": 180.0}

@@ -29,6 +29,7 @@ _FEWEST_RUNS = 8
 _REGULAR_SHARE = 0.6
 _LARGE_STEP = 1.5  # quanta: halfway between a single step and a double one
 _WORTH_A_LOOK = 0.01  # share of exact repeats below which a channel counts as fresh
+_ABSURD = 1e150
 _WILD = 1000.0  # times the usual size of what is not 0: from 100 on no digit of an ordinary log moves
 _ENOUGH = 1000  # values that show the usual size
 
@@ -144,6 +145,12 @@ def measured_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """The measured samples of a channel; of a long one those in the log's sample (`sampled_rows`)."""
     rows = sampled_rows(len(values))
     return known_part(time[rows], values[rows])
+
+
+def measurable(values: Floats) -> Floats:
+    """A channel's values, NaN where one is so large that its square is infinite, as loggers write where nothing was measured."""
+    absurd = np.abs(values) > _ABSURD
+    return np.where(absurd, np.nan, values) if absurd.any() else values
 
 
 def known_part(time: Floats, values: Floats) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats, Ints
-from terragrip.recording.held import fresh_samples, held_period, known_part
+from terragrip.recording.held import fresh_samples, held_period, known_part, measurable
 from terragrip.recording.ranks import median, quantile
 from terragrip.units import STANDARD_GRAVITY
 
@@ -176,7 +176,7 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
 
     The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """
-    part = columns
+    part = {name: measurable(values) for name, values in columns.items()}
     if "ground_speed" in part:
         part = {
             n: v

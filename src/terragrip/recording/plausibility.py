@@ -7,7 +7,7 @@ says nothing itself.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.free_axles import free_axle_warnings
 from terragrip.recording.frozen import frozen_warnings
+from terragrip.recording.held import measurable
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings, thrusts_of
@@ -72,7 +73,8 @@ class _Log:
     """
 
     def __init__(self, recording: Recording, vehicle: Vehicle | None) -> None:
-        self.whole, self.codes = without_codes(recording, vehicle)
+        channels = {name: measurable(values) for name, values in recording.channels.items()}
+        self.whole, self.codes = without_codes(replace(recording, channels=channels), vehicle)
         self.any_vehicle = vehicle
         self.knows_wheels = vehicle is not None and vehicle.knows_wheels
         self._found: dict[str, list[str]] = {}

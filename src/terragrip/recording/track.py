@@ -23,6 +23,7 @@ _SLOWEST = 0.3  # m/s: slower, a course is noise
 _VAGUE_TURN = 0.03  # rad/s, and
 _VAGUE_GRADE = 0.02  # rad: SDs above which no value is given
 _GRADE_WAY = 16.0  # m
+_FEWEST = 10  # fixes
 _DENSE = 40
 """Fixes a window: denser ones, as of positions interpolated to the rate of the wheels, count as their means."""
 _BLOCK = 200_000
@@ -80,10 +81,12 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
         return None
     fresh = np.r_[True, (np.diff(north[rows]) != 0) | (np.diff(east[rows]) != 0)]
     rows = rows[fresh]
-    if len(rows) < 10:
+    if len(rows) < _FEWEST:
         return None
     time, north, east = _means(window / _DENSE, recording.time[rows], north[rows], east[rows])
     fixes = len(time)
+    if fixes < _FEWEST:
+        return None
     span = max(5, int(window / max(median(np.diff(time)), 1e-6)) | 1)
     if fixes < span:
         return None
