@@ -284,16 +284,3 @@ def test_without_ruptures_or_with_an_unknown_signal_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "ruptures.detection.pelt", None)
     with pytest.raises(InputError, match=r"terragrip\[ground\]"):
         changes_of(blocks)
-
-
-def test_resistance_that_may_be_a_hill_is_no_change():
-    """Without a pitch sensor estimates state the hills that resistance may contain."""
-    estimates = drive(5, [("fine", FINE, 240)])
-    hills = 0.08 * np.sin(estimates["distance"] / 5)
-    columns = estimates.columns | {
-        "soil_resistance": estimates["soil_resistance"] + hills,
-        "soil_resistance_std": np.full(len(estimates), 0.25),
-    }
-    blocks = estimates_blocks(replace(estimates, columns=columns))
-    assert changes_of(blocks, step=0.5) == ()
-    assert OnlineChanges(OnlineSettings(step=0.5)).update(blocks) == []

@@ -25,7 +25,7 @@ SIGNALS = (
 _SCALE, _SCALE_SD, _ADHESION_SD = USUAL_CURVE["a"], 0.5, 0.03
 """Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
 _SHOWN = 0.25
-"""Scale and resistance count from where a block tells at least this much of them (inverse variance) beside what is known before."""
+"""The scale counts from where slip and mu tell at least this much of it (inverse variance) beside what is known before."""
 _SLIPS = np.linspace(0, LARGEST_SLIP, 601)
 _OFFSET = 0.02
 """rho_s at which its errors (drawbar's zero, slope) are as much additive as the ground's variation is proportional."""
@@ -65,7 +65,7 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     """
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
-        "soil_resistance": _log_resistance(blocks),
+        "soil_resistance": np.log(np.maximum(blocks.resistance, -_OFFSET / 2) + _OFFSET),
         "curve_scale": _log_scale(slip, adhesion, blocks.slip_variance.mean(axis=1)),
         "soil_resistance_sd": blocks.roughness[:, 0],
         "adhesion_sd": blocks.roughness[:, 1],
@@ -88,13 +88,6 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
 
 def _log_sd(variance: Floats) -> Floats:
     return np.asarray(0.5 * np.log(variance + FLOOR**2))
-
-
-def _log_resistance(blocks: Blocks) -> Floats:
-    """ln of rho_s, (blocks,); NaN where its own error is larger than what ground differs by, as on hills that nothing measures."""
-    level = np.maximum(blocks.resistance, -_OFFSET / 2) + _OFFSET
-    shown = (LAWS["soil_resistance"].sd * level) ** 2 > _SHOWN * blocks.resistance_variance
-    return np.where(shown, np.log(level), np.nan)
 
 
 def _log_scale(slip: Floats, adhesion: Floats, slip_variance: Floats) -> Floats:
