@@ -73,6 +73,7 @@ tg_status tg_estimator_restore(tg_estimator *e, size_t room, const uint8_t *byte
     if (room < object) return TG_BAD_ARGUMENT;
     if (tg_estimator_init(e, &settings) != TG_OK) return TG_BAD_SNAPSHOT; /* nothing can fail from here on */
     tgi_read_fields(tgi_estimator_fields, e, from);
+    e->direction = e->direction < 0 ? -1 : 1; /* 0 is within its range, and neither */
     tgi_read_fields(policy, &e->filter, behind);
     return TG_OK;
 }
