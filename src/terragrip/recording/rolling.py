@@ -146,8 +146,8 @@ def slower_warnings(
     stated = vehicle.uncertainty.wheel_radius
     slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
     ground = recording.channels["ground_speed"]
-    heard = np.isfinite(ground)
-    noise = vehicle.sensors.ground_speed or white_noise(recording.time[heard], ground[heard]) or 0.0
+    measured = np.isfinite(ground)
+    noise = vehicle.sensors.ground_speed or white_noise(recording.time[measured], ground[measured]) or 0.0
     found: dict[str, tuple[float, float]] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
@@ -160,7 +160,7 @@ def slower_warnings(
         if stretch is None:
             continue
         within = (when >= stretch[0]) & (when <= stretch[1])
-        samples = heard & (np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2)
+        samples = measured & (np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2)
         if np.mean((hub - rim - slower * hub)[within]) > _SURE * noise / np.sqrt(samples.sum()):
             found[wheel] = stretch
     if not found:

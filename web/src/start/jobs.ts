@@ -49,7 +49,7 @@ export class JobList {
     this.element.append(h("h2", {}, "Work"), this.list);
     this.leave = notices.on((notice) => {
       if (notice.kind === "job") this.update(notice.job);
-      else if (notice.kind === "connection" && notice.up) void this.ask((job) => this.update(job)); // what ended meanwhile was told to nobody
+      else if (notice.kind === "connection" && notice.up) void this.ask((job) => this.update(job)); // what ended meanwhile was not reported
     });
     void this.ask((job) => void (this.jobs.has(job.id) || this.jobs.set(job.id, job)));
   }

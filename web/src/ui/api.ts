@@ -29,9 +29,9 @@ export function isGoing({ state }: Job): boolean {
   return ORDER.includes(state);
 }
 
-/** Whether what is told of a job is older than what is known: answers and notices overtake each other, and what has ended stays so. */
-export function isOlder(told: Job, known: Job): boolean {
-  return !isGoing(known) || (isGoing(told) && ORDER.indexOf(told.state) < ORDER.indexOf(known.state));
+/** Whether a report of a job is older than what is known: answers and notices overtake each other, and what has ended stays so. */
+export function isOlder(report: Job, known: Job): boolean {
+  return !isGoing(known) || (isGoing(report) && ORDER.indexOf(report.state) < ORDER.indexOf(known.state));
 }
 
 export type Query = Record<string, string | number | boolean | undefined>;
