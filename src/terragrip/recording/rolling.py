@@ -160,7 +160,9 @@ def slower_warnings(
         if stretch is None:
             continue
         within = (when >= stretch[0]) & (when <= stretch[1])
-        samples = measured & (np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2)
+        samples = measured & (
+            np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2
+        )
         if np.mean((hub - rim - slower * hub)[within]) > _SURE * noise / np.sqrt(samples.sum()):
             found[wheel] = stretch
     if not found:
