@@ -145,9 +145,8 @@ def summary(made: FieldMap) -> str:
                 line += f"; {area} {middle:.3f} ({low:.3f} to {high:.3f})"
         found = made.anomalies.get(name, [])
         line += f"; {len(found)} anomal{'y' if len(found) == 1 else 'ies'}"
-        if np.isfinite(
-            least := least_difference(cells.where(driven), found) if name in made.anomalies else np.nan
-        ):
+        least = least_difference(cells.where(driven), found) if name in made.anomalies else np.nan
+        if np.isfinite(least):
             line += f" (hardly one of {PATCH} cells that differs by less than {least:.2g} can be found)"
         changes = made.changes.get(name)
         if changes is not None:

@@ -58,14 +58,16 @@ def turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[ShownT
     ``sample``: rows of the log, by which it is judged whether the machine turned where nothing shows how fast.
     """
     turn, notes = _turn_in(log, sample, vehicle)
-    yaw = sample.channels.get(_YAW_RATE) if turn is None else turn.over(sample)
-    return turn, [*notes, *_at_the_antenna(sample, vehicle, yaw)]
+    return turn, [*notes, *_at_the_antenna(sample, vehicle, turn)]
 
 
-def _at_the_antenna(sample: Recording, vehicle: Vehicle, yaw: Floats | None) -> list[str]:
+def _at_the_antenna(sample: Recording, vehicle: Vehicle, turn: ShownTurn | None) -> list[str]:
     """A sentence where much is taken off the ground speed since it is measured at the vehicle file's antenna."""
+    if vehicle.antenna is None or vehicle.radar is not None:
+        return []
     ground, (ahead, side) = sample.channels.get("ground_speed"), vehicle.receiver
-    if ground is None or yaw is None or vehicle.antenna is None or vehicle.radar is not None:
+    yaw = sample.channels.get(_YAW_RATE) if turn is None else turn.over(sample)
+    if ground is None or yaw is None:
         return []
     moved = np.abs(middle_speed(ground, yaw, ahead=ahead, side=side) - ground) > _MOVED * np.abs(ground)
     driving = np.isfinite(yaw) & (np.abs(ground) > _MOVING)

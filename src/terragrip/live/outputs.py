@@ -75,10 +75,13 @@ Output = Row | Event | Refusal | Ground
 def of_ground(state: GroundState) -> list[Output]:
     """A block's state as outputs of ours; with an event where the ground changes."""
     change = state.change
-    out: list[Output] = [Ground(state.time, state.soil, state.probabilities, None)]
-    if change is not None:
-        numbers = {"time": change.time, "std": change.std, "probability": change.probability}
-        out = [Ground(state.time, state.soil, state.probabilities, numbers)]
-        text = f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
-        out.append(Event(state.time, "ground_change", "ground", text))
-    return out
+    if change is None:
+        return [Ground(state.time, state.soil, state.probabilities, None)]
+    numbers = {"time": change.time, "std": change.std, "probability": change.probability}
+    text = (
+        f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
+    )
+    return [
+        Ground(state.time, state.soil, state.probabilities, numbers),
+        Event(state.time, "ground_change", "ground", text),
+    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.ranks import median
+from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -79,12 +80,12 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     rows = np.flatnonzero(np.isfinite(north) & np.isfinite(east))
     if len(rows) < 2:
         return None
-    fresh = np.r_[True, (np.diff(north[rows]) != 0) | (np.diff(east[rows]) != 0)]
-    rows = rows[fresh]
-    if len(rows) < _FEWEST:
-        return None
-    time, north, east = _means(window / _DENSE, recording.time[rows], north[rows], east[rows])
-    fixes = len(time)
+    rows = rows[np.r_[True, (np.diff(north[rows]) != 0) | (np.diff(east[rows]) != 0)]]
+    fresh = replace(
+        recording, time=recording.time[rows], channels={"north": north[rows], "east": east[rows]}, labels={}
+    )
+    means = averaged(fresh, window / _DENSE)
+    time, north, east, fixes = means.time, means.channels["north"], means.channels["east"], len(means)
     if fixes < _FEWEST:
         return None
     span = max(5, int(window / max(median(np.diff(time)), 1e-6)) | 1)
@@ -103,16 +104,6 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     altitude = _altitude(recording, time[middle])
     return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap)
-
-
-def _means(step: float, time: Floats, *values: Floats) -> tuple[Floats, ...]:
-    """Time (n,) and values, each the means of those within a `step` [s], if most are closer than that."""
-    if not median(np.diff(time)) < 0.75 * step:  # of fixes hardly denser some would stand alone
-        return (time, *values)
-    number = np.floor((time - time[0]) / step)
-    first = np.flatnonzero(np.r_[True, np.diff(number) != 0])
-    count = np.diff(np.r_[first, len(time)])
-    return tuple(x[0] + np.add.reduceat(x - x[0], first) / count for x in (time, *values))
 
 
 def _altitude(recording: Recording, time: Floats) -> Floats:
