@@ -16,8 +16,8 @@ from terragrip.errors import InputError
 from terragrip.estimation.engine import EVENTS
 from terragrip.formats import Profile
 from terragrip.live.frame_decoder import FrameDecoder
+from terragrip.live.links.can import DBC
 from terragrip.live.service import Service
-from terragrip.live.sinks.can import DBC
 
 
 def heard(bus) -> list:
@@ -63,8 +63,8 @@ async def test_estimates_as_frames_that_the_dbc_describes(tmp_path, vehicle, sho
 
 def test_what_is_missing_is_not_available(vehicle):
     from terragrip.estimation.estimator import Estimate, TractionEstimator
+    from terragrip.live.links.can import CanSink
     from terragrip.live.outputs import Row
-    from terragrip.live.sinks.can import CanSink
     from terragrip.live.uri import Uri
 
     estimator = TractionEstimator(vehicle)
@@ -93,7 +93,7 @@ def test_an_unknown_interface_is_refused(vehicle):
 
 
 def test_an_interface_whose_package_is_missing_is_refused_with_the_extra(vehicle, monkeypatch):
-    monkeypatch.setattr("terragrip.live.can_bus.find_spec", lambda name: None)
+    monkeypatch.setattr("terragrip.live.links.can.find_spec", lambda name: None)
     with pytest.raises(
         InputError, match=r"to use udp_multicast .*'msgpack' is needed; pip install 'terragrip\[live\]'"
     ):
@@ -242,8 +242,8 @@ def test_a_dbc_that_is_none_is_refused(tmp_path, vehicle):
 
 
 def test_the_ground_is_a_frame_too(vehicle):
+    from terragrip.live.links.can import CanSink
     from terragrip.live.message import GROUND, SOIL, Message
-    from terragrip.live.sinks.can import CanSink
     from terragrip.live.uri import Uri
 
     sink = CanSink(Uri.parse("can:x?interface=virtual", {"can": ("interface",)}, "sink"), vehicle)

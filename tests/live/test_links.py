@@ -21,8 +21,8 @@ from drives import drive
 from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.formats import Profile
+from terragrip.live.links.foxglove import NAMES
 from terragrip.live.options import Options
-from terragrip.live.schemas import NAMES
 from terragrip.live.service import Service
 from terragrip.live.thread_bridge import repeated_in_thread
 
@@ -238,8 +238,8 @@ async def test_an_mcap_that_cannot_be_written_any_more_ends_neither_the_estimate
 
         close = flush
 
-    monkeypatch.setattr("terragrip.live.sinks.foxglove._FLUSH", -1.0)
-    monkeypatch.setattr("terragrip.live.sinks.foxglove._AGAIN", 0.1)
+    monkeypatch.setattr("terragrip.live.links.foxglove._FLUSH", -1.0)
+    monkeypatch.setattr("terragrip.live.links.foxglove._AGAIN", 0.1)
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"], [f"foxglove://127.0.0.1:{port}?mcap={tmp_path}"])
     sent = messages(short.recording, 40)
     async with running(service):

@@ -84,7 +84,7 @@ async def test_what_the_system_drops_is_counted_and_its_hole_is_no_jump_of_the_c
     vehicle, short, port, sender, monkeypatch
 ):
     """Ten seconds' datagrams and forty more while the loop stands still, then on at their own pace."""
-    monkeypatch.setattr("terragrip.live.sources.udp._BUFFER", 1 << 16)
+    monkeypatch.setattr("terragrip.live.links.udp._BUFFER", 1 << 16)
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
     speeds = dict.fromkeys([f"wheel_speed_{w}" for w in vehicle.wheels], 3.0) | {"ground_speed": 0.55}
     async with running(service):

@@ -14,9 +14,9 @@ from terragrip import TractionEstimator
 from terragrip.cli import main
 from terragrip.errors import InputError
 from terragrip.live.core import Core, Settings
+from terragrip.live.links.can import CanSink
 from terragrip.live.outputs import Row
 from terragrip.live.service import Service
-from terragrip.live.sinks.can import CanSink
 from terragrip.live.uri import Uri
 from terragrip.vehicle import Vehicle
 
@@ -173,7 +173,7 @@ def test_sinks_get_the_columns_there_are() -> None:
 def test_can_frames_give_the_drives_slip_for_each_driven_wheel() -> None:
     import cantools
 
-    from terragrip.live.sinks.can import DBC
+    from terragrip.live.links.can import DBC
 
     one = TractionEstimator(calibrated(), channels=CHANNELS)
     for row in samples(drive())[:200]:

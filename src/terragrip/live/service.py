@@ -13,11 +13,10 @@ from terragrip.live.core import Core
 from terragrip.live.counts import FATES
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.inbox import CAPACITY, Inbox
+from terragrip.live.links import Source, open_sink, open_source
 from terragrip.live.monitor import Monitor
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
-from terragrip.live.sinks import open_sink
-from terragrip.live.sources import Source, open_source
 from terragrip.live.supervision import PAUSE, run_links
 from terragrip.live.vehicle_run import VehicleRun
 

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 from terragrip.live.feed import Lost
+from terragrip.live.links import Sink
 from terragrip.live.outbox import Outbox
-from terragrip.live.sinks import Sink
 
 _BACKOFF = (0.5, 30.0)  # s, doubled from the first to the last
 _PATIENCE = 1.0  # s until a task is cancelled again

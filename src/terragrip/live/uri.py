@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from ipaddress import ip_address
-from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from terragrip.errors import InputError, missing_package, suggestion
+from terragrip.errors import InputError, suggestion
 
 
 def is_address(host: str) -> bool:
@@ -100,22 +98,3 @@ class Uri:
             hint = f"give {', '.join(known[:-1])} or {known[-1]}"
             raise InputError(f"{option} is {text!r}", place=self.text, hint=hint)
         return text
-
-
-Links = dict[str, tuple[str, Collection[str]]]
-"""Of each scheme the module and class behind it, and the options of its URIs."""
-
-
-def opened(text: str, links: Links, role: str, package: str, *arguments: Any) -> tuple[Uri, Any]:
-    """The source or sink of a URI, made of it and ``arguments`` by its class in a module of ``package``, which loads now.
-
-    Raises InputError as `Uri.parse`, and where a Python package that it needs is missing.
-    """
-    uri = Uri.parse(text, {scheme: options for scheme, (_, options) in links.items()}, role)
-    module, name = links[uri.scheme][0].split(".")
-    try:
-        return uri, getattr(import_module(f"{package}.{module}"), name)(uri, *arguments)
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] == "terragrip":
-            raise
-        raise missing_package(error.name or "", "live", place=uri.text) from error

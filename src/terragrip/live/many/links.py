@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from terragrip.errors import InputError
+from terragrip.live.links import Sink, open_sink
 from terragrip.live.many.vehicles import Vehicles
-from terragrip.live.sinks import Sink, open_sink
 from terragrip.live.topics import VEHICLE, VehicleTopics
 from terragrip.live.uri import Uri
 

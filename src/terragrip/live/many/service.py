@@ -13,6 +13,8 @@ from typing import Any, cast
 from terragrip.errors import InputError
 from terragrip.live.counts import FATES
 from terragrip.live.decode import Decoder
+from terragrip.live.links import TopicSource, open_source
+from terragrip.live.links.studio import StudioSink
 from terragrip.live.many.journal import Journal
 from terragrip.live.many.links import Router, check_sources, open_sinks
 from terragrip.live.many.monitor import ManyMonitor
@@ -24,8 +26,6 @@ from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.record_folder import locked
 from terragrip.live.service import HOUSEKEEPING
-from terragrip.live.sinks.studio import StudioSink
-from terragrip.live.sources import TopicSource, open_source
 from terragrip.live.supervision import run_links
 from terragrip.live.vehicle_run import VehicleRun
 

@@ -1,21 +1,29 @@
-"""Datagrams: JSON (an object, a list, one a line), packed numbers by the profile's payload, as Simulink sends them, or NMEA 0183."""
+"""Datagrams. In: JSON (an object, a list, one a line), packed numbers by the profile's payload, as Simulink sends them, or NMEA 0183.
+
+Out, to one address: JSON, or doubles in the order of the wanted columns, as Simulink receives them.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import errno
 import socket
 import struct
 import sys
 
 from terragrip.errors import InputError
 from terragrip.live.feed import Feed, Lost
+from terragrip.live.message import ESTIMATE, Message
 from terragrip.live.nmea import Sentences, holds_sentences
+from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri, is_address, is_loopback
 
 _BUFFER = 4 << 20  # bytes asked for, so that a burst finds room
 _LONGEST = 1 << 16  # bytes of a datagram
 _AT_ONCE = 256  # datagrams
 _SO_MEMINFO, _DROPS = 55, 8  # of Linux (asm-generic/socket.h, linux/sock_diag.h); Python does not name them
+_PASSING = {errno.EAGAIN, errno.ENOBUFS, errno.EMSGSIZE}
+"""What concerns one message, not the way."""
 
 
 class UdpSource:
@@ -112,3 +120,58 @@ def _dropped_by_system(link: socket.socket) -> int:
     except OSError:
         return 0
     return struct.unpack(f"={len(numbers) // 4}I", numbers)[_DROPS]
+
+
+class UdpSink:
+    """``udp://HOST:PORT?format=json|doubles``. Doubles are little-endian: time, then the columns; events are left out."""
+
+    def __init__(self, uri: Uri, *_: object) -> None:
+        self.uri = uri
+        self.packed = uri.choice("format", ("json", "doubles")) == "doubles"
+        self.port = uri.port or 0
+        if not self.port or not uri.host:
+            raise InputError("has no host or no port", place=uri.text, hint="write udp://127.0.0.1:9871")
+
+    async def run(self, outbox: Outbox) -> None:
+        """Send messages; raises Lost where the system does not let us."""
+        try:
+            link = await self._socket()
+        except OSError as error:
+            raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
+        outbox.connected()
+        with link:
+            while True:
+                message = await outbox.get()
+                data = self._packed(message, outbox) if self.packed else message.json(outbox.columns)
+                try:
+                    if data:
+                        link.send(data)
+                except ConnectionRefusedError:
+                    pass  # nobody listens yet; the next may find someone
+                except OSError as error:
+                    if error.errno not in _PASSING:
+                        raise Lost(f"cannot send to {self.uri.host} ({error.strerror or error})") from error
+                    outbox.dropped += 1
+
+    async def _socket(self) -> socket.socket:
+        loop = asyncio.get_running_loop()
+        (family, kind, protocol, _, address), *_ = await loop.getaddrinfo(
+            self.uri.host, self.port, type=socket.SOCK_DGRAM
+        )
+        link = socket.socket(family, kind, protocol)
+        try:
+            link.setblocking(False)
+            link.connect(address)
+        except OSError:
+            link.close()
+            raise
+        return link
+
+    def _packed(self, message: Message, outbox: Outbox) -> bytes:
+        row = message.row
+        if message.kind != ESTIMATE or row is None:
+            return b""
+        places = row.estimate.places if outbox.columns is None else outbox.columns.places(row)
+        values = row.estimate.values
+        numbers = [values[place] for place in places.values()]
+        return struct.pack(f"<{1 + len(numbers)}d", row.estimate.time, *numbers)

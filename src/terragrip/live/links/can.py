@@ -1,26 +1,39 @@
-"""Estimates as CAN frames, by the DBC that comes with the package (terragrip.dbc)."""
+"""A CAN bus by python-can: frames in, by DBC files and the built-in table of J1939 and ISO 11783; estimates out, by terragrip.dbc."""
 
 from __future__ import annotations
 
+import asyncio
 import math
+import sys
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terragrip.errors import InputError
+from terragrip.errors import InputError, missing_package
 from terragrip.estimation.driveline import DRIVEN
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimator import Estimate
 from terragrip.estimation.rims import DRIVE
 from terragrip.ground.classification.labels import UNKNOWN
-from terragrip.live.can_bus import bus_of, check
+from terragrip.live.decode import Decoder
+from terragrip.live.feed import Feed, Lost
+from terragrip.live.frame_decoder import FrameDecoder
 from terragrip.live.message import GROUND, SOIL, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.outputs import Row
+from terragrip.live.thread_bridge import ThreadBridge, repeated_in_thread
 from terragrip.live.uri import Uri
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
+INTERFACES = ("socketcan", "vector", "virtual", "pcan", "kvaser", "slcan", "ixxat", "udp_multicast")
+_PATIENCE = 0.2  # s
+_AT_ONCE = 64  # frames
+_BATCHES = 256
 DBC = Path(__file__).parents[1] / "terragrip.dbc"
 RATE = "10"  # Hz: nine frames a row on four wheels, which is 5 % of 250 kbit/s
 _MOST = 8  # wheels
@@ -35,6 +48,54 @@ _WHEEL = {
     "TG_Wheel": {"Slip": "slip", "Adhesion": "adhesion"},
     "TG_Traction": {"NetTraction": "net_traction", "Efficiency": "efficiency"},
 }
+
+
+class CanSource:
+    """``can:can0?interface=socketcan&dbc=machine.dbc``; several DBC files by commas. The profile's own are read too.
+
+    A sample is stamped by the interface, which is on the machine's clock.
+    """
+
+    real_time = True
+
+    def __init__(self, uri: Uri, decoder: Decoder) -> None:
+        self.uri = uri
+        check(uri)
+        own = decoder.profile.dbc if decoder.profile is not None else ()
+        databases = [name for name in uri.options.get("dbc", "").split(",") if name]
+        wants = decoder.wants if decoder.profile is not None else lambda name: True
+        self.frames = FrameDecoder([*databases, *own], wants)
+        decoder.units = self.frames.units
+
+    async def run(self, feed: Feed) -> None:
+        """Feed frames; raises Lost where the bus is not there or goes away."""
+        bridge = ThreadBridge(feed, _BATCHES)
+        feed.one_layout = False
+
+        def read(bus: Any) -> None:
+            frame = bus.recv(_PATIENCE)
+            batch: list[Any] = []
+            while frame is not None and len(batch) < _AT_ONCE:
+                batch.append(frame)
+                frame = bus.recv(0.0)
+            if frame is not None:
+                batch.append(frame)
+            if batch:
+                bridge.call(self._feed, feed, batch)
+
+        async with bus_of(self.uri) as bus:
+            feed.connected()
+            await repeated_in_thread(partial(read, bus))
+
+    def _feed(self, feed: Feed, batch: list[Any]) -> None:
+        for frame in batch:
+            if frame.is_error_frame or frame.is_remote_frame:
+                continue
+            fields = self.frames.fields(frame.arbitration_id, frame.is_extended_id, bytes(frame.data))
+            if fields:
+                feed.fields({**fields, "time": frame.timestamp} if frame.timestamp > 0 else fields)
+            else:
+                feed.messages += 1
 
 
 class CanSink:
@@ -129,3 +190,52 @@ def _raw(signal: Any, value: float) -> int:
     raw = round((value - signal.offset) / signal.scale)
     most = round((signal.maximum - signal.offset) / signal.scale)
     return min(max(raw, 0), most)
+
+
+def check(uri: Uri) -> str:
+    """The interface's name; raises InputError on a missing channel or an unknown interface."""
+    _python_can()
+    if not uri.path:
+        raise InputError("names no channel", place=uri.text, hint="write can:can0")
+    interface = uri.choice("interface", INTERFACES)
+    if interface == "udp_multicast" and find_spec("msgpack") is None:
+        raise missing_package("msgpack", "live", "use udp_multicast", place=uri.text)
+    return interface
+
+
+@asynccontextmanager
+async def bus_of(uri: Uri) -> AsyncIterator[Any]:
+    """The bus of ``can:can0?interface=socketcan&bitrate=250000``; raises Lost where it is not there or goes away."""
+    can = _python_can()
+    options: dict[str, Any] = {"interface": check(uri), "channel": uri.path}
+    if "bitrate" in uri.options:
+        options["bitrate"] = round(uri.number("bitrate", 250_000))
+    try:
+        bus = await asyncio.to_thread(can.Bus, **options)
+    except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
+        raise Lost(f"the bus: {' '.join(str(error).split())[:160]}") from error
+    try:
+        yield bus
+    except (can.CanError, OSError) as error:
+        raise Lost(f"the bus: {error}") from error
+    finally:
+        bus.shutdown()
+
+
+def _python_can() -> Any:
+    with _without("asammdf"):
+        import can
+    return can
+
+
+@contextmanager
+def _without(package: str) -> Iterator[None]:
+    """python-can imports asammdf where it is installed, for a log format: 85 MB and 0.6 s that a live bus does not need."""
+    if "can" in sys.modules or package in sys.modules:
+        yield
+        return
+    sys.modules[package] = None  # type: ignore[assignment]  # makes its import fail
+    try:
+        yield
+    finally:
+        del sys.modules[package]

@@ -1,4 +1,4 @@
-"""The session of a Zenoh source or sink."""
+"""Key expressions of Zenoh: payloads in as those of MQTT; estimates, events and the status out as JSON."""
 
 from __future__ import annotations
 
@@ -9,8 +9,58 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from terragrip.errors import InputError
-from terragrip.live.feed import Lost
+from terragrip.live.feed import Lost, Receiver
+from terragrip.live.outbox import Outbox
+from terragrip.live.thread_bridge import ThreadBridge
+from terragrip.live.topics import of_vehicle
 from terragrip.live.uri import Uri, is_loopback
+
+
+class ZenohSource:
+    """``zenoh:machine/**?connect=tcp/127.0.0.1:7447``."""
+
+    real_time = True
+
+    def __init__(self, uri: Uri, *_: object) -> None:
+        self.uri = uri
+        self.key = key_of(uri, "machine/**")
+        config(uri)
+
+    async def run(self, feed: Receiver) -> None:
+        """Feed samples; raises Lost where the other side is not there. Zenoh itself connects again later."""
+        bridge = ThreadBridge(feed)
+
+        def received(sample: Any) -> None:  # in a thread of Zenoh's
+            data, topic = bytes(sample.payload), str(sample.key_expr)
+            bridge.call(lambda: feed.message(data, topic=topic))
+
+        async with session(self.uri) as peer:
+            peer.declare_subscriber(self.key, received)
+            feed.connected()
+            await asyncio.Event().wait()
+
+
+class ZenohSink:
+    """``zenoh:terragrip?listen=tcp/127.0.0.1:7447``: to ``terragrip/estimate`` and so on; ``{vehicle}`` as of MQTT."""
+
+    def __init__(self, uri: Uri, *_: object) -> None:
+        self.uri = uri
+        self.key = key_of(uri, "terragrip")
+        config(uri)
+
+    async def run(self, outbox: Outbox) -> None:
+        """Put messages; raises Lost where Zenoh refuses."""
+        import zenoh
+
+        async with session(self.uri) as peer:
+            outbox.connected()
+            while True:
+                message = await outbox.get()
+                peer.put(
+                    f"{of_vehicle(self.key, message.vehicle)}/{message.kind}",
+                    message.json(outbox.columns),
+                    encoding=zenoh.Encoding.APPLICATION_JSON,
+                )
 
 
 @asynccontextmanager

@@ -1,4 +1,4 @@
-"""A WebSocket server for Foxglove, and the same messages in MCAP files."""
+"""A WebSocket server for Foxglove, and the same messages in MCAP files, each kind with its JSON schema."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from terragrip.errors import InputError
 from terragrip.files import unwritable
 from terragrip.live.feed import Lost
-from terragrip.live.message import Message
+from terragrip.live.message import ESTIMATE, EVENT, GROUND, SETPOINT, SOIL, STATUS, Message
 from terragrip.live.outbox import Outbox
-from terragrip.live.schemas import NAMES, schema_of
 from terragrip.live.uri import Uri, is_loopback
+from terragrip.log_events import LIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from terragrip.vehicle import Vehicle
 
@@ -25,6 +25,64 @@ _FLUSH = 1.0  # s
 _CHUNK = 1 << 16  # bytes: what a kill can cost a file
 _SEGMENT = 600.0  # s in one MCAP file
 _AGAIN = 30.0  # s until another is tried
+
+NAMES = {
+    ESTIMATE: "terragrip.TractionEstimate",
+    GROUND: "terragrip.GroundChange",
+    SOIL: "terragrip.Soil",
+    EVENT: "terragrip.Event",
+    SETPOINT: "terragrip.SlipSetpoint",
+    STATUS: "terragrip.Status",
+}
+
+_NUMBER = {"type": ["number", "null"]}
+_TEXT = {"type": "string"}
+_COUNT = {"type": "integer"}
+_TIME = {"type": ["number", "null"], "description": "s, on the samples' time base"}
+
+_PROPERTIES: dict[str, dict[str, Any]] = {
+    ESTIMATE: {
+        "time": _TIME,
+        "arrival": {"type": "number", "description": "s since 1970, of the row's first sample"},
+        "event": _TEXT,
+        "predicted": {"type": "boolean", "description": "nothing was measured: the filter predicted"},
+    },
+    GROUND: {"time": _TIME, "std": _NUMBER, "probability": _NUMBER},
+    SOIL: {
+        "time": _TIME,
+        "soil": _TEXT,
+        "probability": _NUMBER,
+        "probabilities": {"type": "object", "additionalProperties": {"type": "number"}},
+    },
+    SETPOINT: {
+        "time": _TIME,
+        "state": {"type": "string", "enum": ["follow", "slow", "stop"]},
+        "why": _TEXT,
+        "slip": _NUMBER,
+        "speed": _NUMBER,
+        "wheel_speed": {
+            "type": "object",
+            "description": "rad/s by driven wheel; advice, not a command",
+            "additionalProperties": {"type": "number"},
+        },
+    },
+    EVENT: {"time": _TIME, "kind": {"type": "string", "enum": list(LIVE)}, "source": _TEXT, "text": _TEXT},
+    STATUS: {
+        "time": _TIME,
+        "rows": _COUNT,
+        "row_rate": _NUMBER,
+        "sample_rate": _NUMBER,
+        "delay": {"type": "number", "description": "s, mean, from a row's first sample to its estimate"},
+        "silent": {"type": "array", "items": _TEXT, "description": "sources of which nothing came lately"},
+        "waiting": _COUNT,
+        "counts": {
+            "type": "object",
+            "description": "by channel: received, late, doubled, missing, dropped, …",
+        },
+        "events": {"type": "object", "additionalProperties": _COUNT},
+        "sinks": {"type": "object"},
+    },
+}
 
 
 class FoxgloveSink:
@@ -124,3 +182,9 @@ class FoxgloveSink:
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
+
+
+def schema_of(kind: str, columns: Iterable[str] = ()) -> dict[str, Any]:
+    """The schema of a kind of message; of an estimate, with the vehicle's ``columns``."""
+    own = dict.fromkeys(columns, _NUMBER) if kind == ESTIMATE else {}
+    return {"title": NAMES[kind], "type": "object", "properties": _PROPERTIES[kind] | own}

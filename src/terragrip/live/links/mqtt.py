@@ -1,4 +1,4 @@
-"""The connection to an MQTT broker, for source and sink: reads and writes are made in the event loop, many messages in one turn."""
+"""Topics of an MQTT broker, by paho: reads and writes are made in the event loop, many messages in one turn."""
 
 from __future__ import annotations
 
@@ -6,18 +6,72 @@ import asyncio
 import select
 import socket
 import ssl
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Self
 
 from terragrip.errors import InputError
 from terragrip.live.credentials import Credentials
-from terragrip.live.feed import Lost
+from terragrip.live.feed import Lost, Receiver
+from terragrip.live.outbox import Outbox
+from terragrip.live.topics import of_vehicle
 from terragrip.live.uri import Uri, is_loopback
 
 _PATIENCE = 5.0  # s for the broker to answer, and to take what is left at the end
-_AT_ONCE = 64  # messages read before others have their turn
+_AT_ONCE = 64  # messages before others have their turn
 _UNACKNOWLEDGED = 20  # messages of quality 1 or 2: of more mosquitto holds some back
 _KEEP = 1.0  # s between two looks at whether the broker is alive
+
+
+class MqttSource:
+    """``mqtt://HOST/machine/+``. A field is ``name``, or ``topic/name`` where the profile says so; a bare number is ``topic``."""
+
+    real_time = True
+
+    def __init__(self, uri: Uri, *_: object) -> None:
+        self.uri = uri
+        self.qos = quality(uri)
+        check(uri, wild=True)
+
+    async def run(self, feed: Receiver) -> None:
+        """Feed messages; raises Lost where the broker refuses or goes away."""
+        async with Connection(self.uri, lambda topic, data: feed.message(data, topic=topic)) as broker:
+            await broker.subscribe(self.uri.path, self.qos)
+            feed.connected()
+            await broker.ended()
+
+
+class MqttSink:
+    """``mqtt://HOST/terragrip``: to ``terragrip/estimate``, ``terragrip/event``, ``/status``, ``/soil``, ``/ground`` and ``/setpoint``.
+
+    ``{vehicle}`` in the topic stands for the name of a message's vehicle.
+    """
+
+    def __init__(self, uri: Uri, *_: object) -> None:
+        self.uri = uri
+        self.qos = quality(uri)
+        check(uri)
+        self._again: deque[tuple[str, bytes]] = deque()  # what no broker acknowledged
+
+    async def run(self, outbox: Outbox) -> None:
+        """Publish messages; raises Lost where the broker refuses or goes away."""
+        prefix, sent = self.uri.path.rstrip("/"), 0
+        async with Connection(self.uri) as broker:
+            outbox.connected()
+            try:
+                while True:
+                    if self._again:
+                        topic, data = self._again.popleft()
+                    else:
+                        message = await outbox.get()
+                        topic = f"{of_vehicle(prefix, message.vehicle)}/{message.kind}"
+                        data = message.json(outbox.columns)
+                    broker.publish(topic, data, self.qos)
+                    sent += 1
+                    if not broker.has_room or not sent % _AT_ONCE:
+                        await broker.room()
+            finally:
+                self._again.extendleft(reversed(broker.unacknowledged.values()))
 
 
 def check(uri: Uri, wild: bool = False) -> Credentials:
