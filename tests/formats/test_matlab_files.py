@@ -124,3 +124,51 @@ def test_our_own_names_in_a_struct_are_proposed(tmp_path: Path) -> None:
     assert {name: proposals[name].entry["from"] for name in names} == {
         name: f"log.run.{name}" for name in names
     }
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_a_matrix_may_have_its_signals_in_rows_and_time_along_its_last_axis(
+    tmp_path: Path, version: str
+) -> None:
+    """MATLAB's row vectors; Simulink's signals of two dimensions. Left out in silence, they were no wheels."""
+    both = np.stack([SPEED, HOT])
+    content = {
+        "t": TIME.reshape(1, -1),
+        "rows": both,
+        "wide": np.tile(SPEED[:, None], 40),
+        "cube": both.reshape(2, 1, -1),
+    }
+    table = read_table(saved(tmp_path / "log.mat", version, content | {"image": np.ones((300, len(TIME)))}))
+    for name in ("rows", "cube"):
+        assert np.array_equal([table.columns[f"{name}[{k}]"] for k in range(2)], both)
+    assert np.array_equal(table.columns["wide[39]"], SPEED)
+    assert any("image has 300 numbers for each instant" in note for note in table.notes)
+
+
+@pytest.mark.parametrize("columns", [False, True])
+def test_simulinks_to_file_block_writes_time_as_the_first_row(tmp_path: Path, columns: bool) -> None:
+    matrix = np.stack([TIME, SPEED, HOT])
+    scipy.io.savemat(
+        tmp_path / "log.mat", {"ans": matrix.T if columns else matrix, "K": np.ones(3)}, format="4"
+    )
+    table = read_table(tmp_path / "log.mat")
+    assert set(table.columns) == {"time", "ans[1]", "ans[2]"}
+    assert np.array_equal(table.columns["ans[2]"], HOT)
+    assert np.allclose(table.columns["time"], TIME)
+    assert any("of ans is used as time" in note for note in table.notes)
+
+
+@pytest.mark.parametrize("main", ["t", "t_wheels"])
+def test_vectors_at_two_rates_beside_two_time_vectors(tmp_path: Path, main: str) -> None:
+    content = {main: TIME, "w": SPEED, "t_gps": TIME[::4], "v_gps": SPEED[::4]}
+    scipy.io.savemat(tmp_path / "log.mat", content)
+    table = read_table(tmp_path / "log.mat")
+    assert np.allclose(table.columns["w"], SPEED)
+    assert np.array_equal(table.columns["v_gps"][::4], SPEED[::4])
+    assert np.isfinite(table.columns["v_gps"]).sum() == len(TIME[::4])
+
+
+def test_vectors_of_another_length_are_named_where_nothing_is_time(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "log.mat", {"w": SPEED, "x": HOT, "v": SPEED[::4], "K": np.ones(3)})
+    (note,) = read_table(tmp_path / "log.mat").notes
+    assert "others were left out: v (50)" in note

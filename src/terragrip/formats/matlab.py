@@ -20,7 +20,7 @@ from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_long import long_matlab
 from terragrip.formats.matlab_objects import TICKS, plain
 from terragrip.formats.matlab_records import IN_RECORDS, STREAM, resolved
-from terragrip.formats.matlab_signals import Contents, seconds_of, walk
+from terragrip.formats.matlab_signals import Contents, matrices_with_time, seconds_of, walk
 from terragrip.formats.matlab_values import Array, Opaque, read_array
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
@@ -104,6 +104,8 @@ def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
     if first_run:  # nobody has named a run: signals of two must not be mixed
         later = tuple(f"{name}[{k}]." for name, count in contents.runs.items() for k in range(1, count))
         contents.signals = {n: one for n, one in contents.signals.items() if not n.startswith(later)}
+    if not contents.signals:
+        matrices_with_time(contents)
     if not contents.signals and not contents.loose:
         notes = _notes(contents)
         problem = "; ".join(["has no numeric column", *(note.rstrip(".") for note in notes[:1])])
@@ -111,7 +113,7 @@ def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
             problem = notes[0].rstrip(".")
         raise InputError(problem, file=path, hint="save arrays or structs with a time vector beside them")
     if not contents.signals:
-        contents.loose = _of_one_length(contents.loose)
+        _keep_one_length(contents)
     return contents
 
 
@@ -186,11 +188,19 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
-def _of_one_length(loose: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns that have the length that most have."""
-    lengths = [int(np.prod(value.shape)) for value in loose.values()]
-    length = max(set(lengths), key=lambda n: (lengths.count(n), n))
-    return {name: value for (name, value), n in zip(loose.items(), lengths, strict=True) if n == length}
+def _keep_one_length(contents: Contents) -> None:
+    """Of columns without a clock keep those of the length that most have; a note names the others."""
+    lengths = {name: int(np.prod(value.shape)) for name, value in contents.loose.items()}
+    counts = list(lengths.values())
+    length = max(set(counts), key=lambda n: (counts.count(n), n))
+    others = [
+        f"{name} ({n})" for name, n in lengths.items() if n != length and n > length / 20
+    ]  # shorter ones are parameters
+    if others:
+        contents.notes.append(
+            f"No vector is named as time (t, time, tout, t_gps ...), and most have {length} numbers; others were left out: {_some(others)}."
+        )
+    contents.loose = {name: value for name, value in contents.loose.items() if lengths[name] == length}
 
 
 FORMATS = (

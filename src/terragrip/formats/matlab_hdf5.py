@@ -67,7 +67,7 @@ def _array_of_hdf5(item: Any, *, turned: bool) -> Array:
     """A dataset of numbers; ``turned``: by MATLAB, whose first axis is the last one in the file."""
     shape = tuple(reversed(item.shape)) if turned else item.shape
 
-    def part(rows: slice, column: int) -> npt.NDArray[Any]:
+    def part(rows: Any, column: Any) -> npt.NDArray[Any]:
         place: tuple[Any, ...] = (rows,) if len(shape) == 1 else (rows, column)
         if len(shape) == 2 and shape[0] == 1:
             place = (0, rows)  # a row vector

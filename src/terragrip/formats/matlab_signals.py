@@ -24,7 +24,11 @@ _DATA = ("data", "values")
 _UNITS = ("unit", "units", "dataunits")
 _NAMES = ("name", "label", "signalname", "blockname")
 _PORT = re.compile(r"/Out1$")  # the first output of a block, which is named by the block
-_WIDEST = 32  # columns of a matrix that are signals
+_OTHER_TIMES = re.compile(
+    r"(t|time|tout|timestamp)_\w+|\w+_(t|time|timestamp)", re.IGNORECASE
+)  # t_gps: of signals at another rate
+_WIDEST = 256  # columns of a matrix that are signals: a logger's channels, no image
+_SHORTEST = 20  # rows of a matrix with its time in it: lookup tables are shorter
 _DEEPEST = 12
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
 _DATENUM_1970 = 719_529.0
@@ -33,7 +37,7 @@ _DATENUM_1970 = 719_529.0
 @dataclass
 class Contents:
     """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; ``loose`` vectors without
-    a clock; ``odd`` ones of another length than their clock, with both lengths.
+    a clock; ``odd`` ones of another length than their clock, with both lengths; ``matrices`` without a clock beside them.
 
     ``runs``: arrays of drives, and how many they hold; ``notes`` say which of several vectors was taken for time.
     """
@@ -44,6 +48,7 @@ class Contents:
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
     odd: dict[str, tuple[int, int]] = field(default_factory=dict)
+    matrices: dict[str, Any] = field(default_factory=dict)
     runs: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -79,29 +84,37 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
     lower = {key.lower(): key for key in reversed(list(struct))}  # of names that differ in case, the first
     clock_name = _clock_name(struct, name, contents)
     clock = above if clock_name is None else struct[clock_name]
+    others = _other_clocks(struct, clock)
+    if clock is None and len(others) > 1:
+        clock_name = next(iter(others.values()))
+        clock = struct[clock_name]
     if clock is not None:
         length = int(np.prod(clock.shape))
-        if clock_name is not None:
-            contents.scales[id(clock)] = _SCALES.get(clock_name.rpartition("_")[2].lower(), 1.0)
+        used = {clock_name, *others.values()}
+        for key in filter(None, used):
+            contents.scales[id(struct[key])] = _SCALES.get(key.rpartition("_")[2].lower(), 1.0)
         if "signals" in lower and _structure_with_time(
             struct[lower["signals"]], clock, length, name, contents
         ):
             return
         for key, part in struct.items():
-            if key == clock_name or not _is_numeric(part):
+            if key in used or not _is_numeric(part):
                 continue
-            if length not in part.shape[:2]:
+            rows = next((n for n in (length, *others) if n in part.shape), None)
+            if rows is None:
                 if _is_vector(part) and max(part.shape) > length / 2:  # shorter ones are parameters
                     contents.odd[_joined(name, key)] = max(part.shape), length
             else:
                 plain = key.lower() in _DATA and name
                 stated = next((lower[word] for word in _UNITS if word in lower), None)
                 unit = struct[stated] if plain and stated is not None else None
-                _add(contents, name if plain else _joined(name, key), clock, part, length, unit)
+                its = clock if rows == length else struct[others[rows]]
+                _add(contents, name if plain else _joined(name, key), its, part, rows, unit)
     for key, part in struct.items():
         if _is_numeric(part):
-            if clock is None and _is_vector(part):
-                contents.loose[_joined(name, key)] = part
+            if clock is None:
+                kind = contents.loose if _is_vector(part) else contents.matrices
+                kind[_joined(name, key)] = part
         elif key.lower() == "values" and isinstance(part, Mapping | Opaque):
             walk(part, name, contents, depth + 1, clock)  # a Dataset's element: its name is the signal's
         elif key.lower() in ("elements", "signals") and not isinstance(part, str):
@@ -122,6 +135,41 @@ def _clock_name(struct: Mapping[str, Any], name: str, contents: Contents) -> str
         if alike:
             return alike[0]
     return None
+
+
+def _other_clocks(struct: Mapping[str, Any], clock: Any) -> dict[int, str]:
+    """Vectors of time at other rates (``t_gps`` beside ``t``, or ``t_wheels`` and ``t_gps``) by their length, which no other has."""
+    taken = 0 if clock is None else int(np.prod(clock.shape))
+    found: dict[int, list[str]] = {}
+    for key, part in struct.items():
+        if (
+            _OTHER_TIMES.fullmatch(key)
+            and _is_vector(part)
+            and max(part.shape) != taken
+            and _runs_forward(part)
+        ):
+            found.setdefault(max(part.shape), []).append(key)
+    return {length: keys[0] for length, keys in found.items() if len(keys) == 1}
+
+
+def matrices_with_time(contents: Contents) -> None:
+    """Take the signals of matrices whose first row or column is time, as Simulink's To File block writes its (1 + signals, n)."""
+    for name, values in contents.matrices.items():
+        if len(values.shape) != 2 or not 1 < min(values.shape) < _SHORTEST + min(values.shape) <= max(
+            values.shape
+        ):
+            continue
+        length = max(values.shape)
+        table = oriented(values, length)
+        stamps = read_array(table)[:, 0]
+        if not _runs_forward(stamps):
+            continue
+        _add(contents, name, stamps, table, length)
+        contents.signals.pop(f"{name}[0]")
+        place = "row" if values.shape[1] == length else "column"
+        contents.notes.append(
+            f"The first {place} of {name} is used as time; {name}[1] is the {place} after it."
+        )
 
 
 def _runs_forward(value: Any) -> bool:
@@ -165,7 +213,7 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, conte
     """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
     is_used = False
     for k, part in enumerate(_structs(signals)):
-        if _is_numeric(part.get("values")) and length in part["values"].shape[:2]:
+        if _is_numeric(part.get("values")) and length in part["values"].shape:
             own = _own_name(part) or f"signals[{k}]"
             _add(contents, _joined(name, own), clock, part["values"], length)
             is_used = True
@@ -173,18 +221,35 @@ def _structure_with_time(signals: Any, clock: Any, length: int, name: str, conte
 
 
 def _add(contents: Contents, name: str, clock: Any, values: Any, length: int, unit: Any = None) -> None:
-    """Add a vector, or the columns of a matrix with a row for each instant."""
+    """Add a vector, or the signals of an array with one for each instant along its first or last axis."""
     width = int(np.prod(values.shape)) // max(length, 1)
-    if width == 1:
-        added: dict[str, int | None] = {name: None}
-    elif values.shape[0] == length and len(values.shape) == 2 and width <= _WIDEST:
-        added = {f"{name}[{k}]": k for k in range(width)}
-    else:
+    if width > _WIDEST:
+        contents.notes.append(
+            f"{name} has {width} numbers for each instant, and was left out: a signal is one number."
+        )
         return
-    for own, column in added.items():
-        contents.signals[own] = clock, values, column
+    table = values if width == 1 else oriented(values, length)
+    for k in range(width):
+        own = f"{name}[{k}]" if width > 1 else name
+        contents.signals[own] = clock, table, k if width > 1 else None
         if isinstance(unit, str) and is_common(unit):
             contents.units[own] = unit
+
+
+def oriented(values: Any, length: int) -> Any:
+    """An array with a row of all its numbers for each of ``length`` instants, which are along its first axis or its last one."""
+    if values.shape[0] == length and len(values.shape) == 2:
+        return values
+    axis = 0 if values.shape[0] == length else -1
+
+    def read() -> npt.NDArray[Any]:
+        return np.moveaxis(read_array(values), axis, 0).reshape(length, -1)
+
+    if not isinstance(values, Array):
+        return read()
+    part = values.part
+    turned = None if part is None else lambda rows, column: part(column, rows)
+    return Array((length, int(np.prod(values.shape)) // length), read, turned)
 
 
 def _own_name(part: Any) -> str:

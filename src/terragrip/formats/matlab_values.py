@@ -21,12 +21,12 @@ class Opaque:
 class Array:
     """A numeric array, read when it is asked for; ``shape`` as in MATLAB.
 
-    ``part`` reads some rows of one column of a vector or matrix; without it the whole array is read for that.
+    ``part`` reads what two indices or slices select of a vector or matrix; without it the whole array is read for that.
     """
 
     shape: tuple[int, ...]
     read: Callable[[], npt.NDArray[Any]]
-    part: Callable[[slice, int], npt.NDArray[Any]] | None = None
+    part: Callable[[Any, Any], npt.NDArray[Any]] | None = None
 
     def column(self, number: int, length: int, rows: slice = slice(None)) -> npt.NDArray[Any]:
         """Some rows of a column, where the array has ``length`` rows (or is a vector of as many numbers)."""
