@@ -13,6 +13,7 @@ from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import Blocks, _streak, blocks_of, driven_wheels, wheel_loads
 from terragrip.soil.library import Soil
 from terragrip.soil.signature import (
+    USUAL_CURVE,
     Signature,
     _correlation,
     _ground,
@@ -164,7 +165,7 @@ def known_blocks(count: int = 40, seed: int = 2) -> Blocks:
 
 def test_an_error_about_the_curve_is_relative_and_its_variance_goes_by_the_slope() -> None:
     blocks = known_blocks()
-    error, variance, scale = curve_error(SOIL, blocks)
+    error, variance, scale, steepness = curve_error(SOIL, blocks)
     share, step = np.array([0.75, 0.25]), 1e-6
     curve = CURVES["exponential"].value(blocks.slip, {"a": 0.9}) - 0.02
     ahead = CURVES["exponential"].value(blocks.slip + step, {"a": 0.9}) - 0.02
@@ -173,6 +174,9 @@ def test_an_error_about_the_curve_is_relative_and_its_variance_goes_by_the_slope
     slope = (ahead - curve) / step
     known = np.sqrt(blocks.adhesion_variance + slope**2 * blocks.slip_variance) @ share
     np.testing.assert_allclose(variance, (known / scale) ** 2, rtol=1e-4)
+    np.testing.assert_allclose(
+        steepness, 0.9 / USUAL_CURVE["a"], rtol=0.05
+    )  # intercepts count in the height alone
 
 
 def test_the_ground_under_noisy_values_is_paule_and_mandels() -> None:

@@ -23,6 +23,7 @@ from terragrip.ground.laws import (
     level_weight,
     mixed,
     normal,
+    of_slip,
     tempered,
 )
 from terragrip.ground.roughness import Roughness, shared
@@ -127,18 +128,19 @@ class Emissions:
 
 def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
     """Log density of rho_s and mu on a known soil, (blocks,)."""
-    error, own, scale = curve_error(soil, blocks)
+    error, own, scale, steepness = curve_error(soil, blocks)
     own = own + _relative_interval(soil) ** 2
     if signature is None:
         mean, sd = soil.resistance or BROAD_RESISTANCE
-        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale)
+        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale) + of_slip(own, _CURVE_SPREAD, steepness)
         return mu + normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
     first = np.sqrt(signature.level_sd[0] ** 2 + blocks.resistance_variance)
     second = np.sqrt(signature.level_sd[1] ** 2 + own)
     x, y = (blocks.resistance - signature.level[0]) / first, (error - signature.level[1]) / second
     correlation = signature.level_correlation
     covariance = np.array([[1.0, correlation], [correlation, 1.0]])
-    return bivariate(np.stack([x, y], axis=-1), covariance) - np.log(first * second * scale)
+    both = bivariate(np.stack([x, y], axis=-1), covariance) - np.log(first * second * scale)
+    return both + of_slip(own, signature.level_sd[1], steepness)
 
 
 def _relative_interval(soil: Soil) -> float:

@@ -46,6 +46,16 @@ def normal(error: Floats, variance: Floats) -> Floats:
     return np.asarray(-0.5 * (error**2 / variance + np.log(2 * np.pi * variance)))
 
 
+def of_slip(own: Floats, spread: float, steepness: Floats) -> Floats:
+    """What makes a log density of mu one of slip, for the share of the error about a curve that the estimates' own variance has beside the
+    soil's spread; slope of the curve over the usual one's.
+
+    The pull is given, slip is measured, and mostly it is slip that errs. As a density of mu, a flat curve would win by its name: it makes
+    the same error of slip a small one of mu.
+    """
+    return np.asarray(own / (own + spread**2) * np.log(steepness))
+
+
 def bivariate(off: Floats, covariance: Floats) -> Floats:
     """Log density of a normal law of pairs, (blocks, 2) to (blocks,)."""
     (a, b), (_, c) = covariance

@@ -20,7 +20,7 @@ class Chain:
     """The prior: mean length of one soil [m], and the share of unknown soils among the new ones."""
 
     length: float = 8.0
-    unknown: float = 0.1
+    unknown: float = 0.15
 
     def start(self, states: NDArray[np.int64]) -> Floats:
         """Prior probabilities (states,): known soils equally likely, states of one soil equally likely. `states`: of `Emissions`."""

@@ -18,11 +18,12 @@ from terragrip.ground.laws import (
     broad_roughness,
     mixed,
     normal,
+    of_slip,
     tempered,
 )
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import LARGEST_SLIP, Blocks
-from terragrip.soil.signature import OFFSET
+from terragrip.soil.signature import OFFSET, USUAL_CURVE
 
 UNKNOWN = "unknown"
 
@@ -81,4 +82,5 @@ def _adhesion(blocks: Blocks) -> Floats:
     error = (blocks.mean_adhesion[:, None] - SCALES * shape) / scale
     known = np.hypot(np.sqrt(blocks.adhesion_variance)[:, None, :], SCALES[:, None] * by_slip[:, None, :])
     own = ((known * blocks.share[:, None, :]).sum(axis=2) / scale) ** 2
-    return normal(error, _SCALE_SPREAD**2 + own) - np.log(scale)
+    steepness = SCALES / USUAL_CURVE["a"]
+    return normal(error, _SCALE_SPREAD**2 + own) - np.log(scale) + of_slip(own, _SCALE_SPREAD, steepness)
