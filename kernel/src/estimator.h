@@ -113,7 +113,7 @@ typedef struct { /* uneven ground, see roughness.c */
 } tgi_roughness;
 
 typedef struct { /* slips of the driven wheels in a row; 0 of others */
-    tg_real along[8], straight[8]; /* on each hub's own way, and as if the vehicle did not turn */
+    tg_real along[8], straight[8]; /* on each hub's own way, and as if all went at the vehicle's speed where each points */
     tg_real variance;              /* of one wheel's, by the errors of the wheels' speeds, in the mean */
     int32_t known;                 /* else they show nothing */
 } tgi_slips;

@@ -127,8 +127,9 @@ tgi_slips tgi_driven_slips(const tg_estimator *e)
     tgi_slips slips = {{0}, {0}, 0, v > s->standstill_speed};
     for (int32_t i = 0; i < n; i++) {
         if (!(e->constants.pulls[i] > 0)) continue;
-        const tg_real hub = tgi_hub_of(v - s->wheel_side[i] * yaw, s->wheel_ahead[i] * yaw);
-        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i], straight = v * inverse * e->constants.inverse_radius[i];
+        const tg_real ahead = v - s->wheel_side[i] * yaw, hub = tgi_hub_of(ahead, s->wheel_ahead[i] * yaw);
+        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i];
+        const tg_real straight = s->wheel_ahead[i] != 0 ? part * v / ahead : v * inverse * e->constants.inverse_radius[i];
         slips.along[i] = 1 - part;
         slips.straight[i] = 1 - straight;
         slips.known &= part > 0 && part < 2 && straight > 0 && straight < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)s->tuned.silence;
@@ -180,7 +181,8 @@ static tg_real left_by_spin(const tg_estimator *e)
 }
 
 /* After a row that holds a wheel's speed, `travelled` wheel radii behind the last such row; `flowing`: it continues that one. Slips as if
- * the vehicle did not turn: what a turn does is a trend, and a gyroscope's noise is none. */
+ * the vehicle did not turn: what a turn does to a side is a trend, and a gyroscope's noise is none. Of a steered wheel, its longer way is
+ * taken off: one axle's alone is a diagonal in a turn. */
 void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled)
 {
     tgi_warped *w = &e->warped;
