@@ -358,3 +358,28 @@ def test_the_pages_fit_every_width_and_axe_finds_nothing_serious(
             faults += [f"{where} at {width}: {wide} px too wide"] if wide > 0 else []
     context.close()
     assert faults == []
+
+
+def test_matrices_of_simulink_are_assigned_to_the_wheels(
+    page: Any, served: Served, folder: Path, made: Path
+) -> None:
+    """Nothing names the wheels of omega (n, 4): it was proposed as the machine's rate of turn, and the page went on to say that
+    the log has no wheel speed when four had been chosen."""
+    table = pd.read_parquet(made / "recording.parquet").dropna(subset=["wheel_speed_fl", "ground_speed"])
+    omega = table[[f"wheel_speed_{wheel}" for wheel in WHEELS]].to_numpy()
+    series = {"Time": table["time"].to_numpy(), "Units": "rad/s", "Data": omega}
+    savemat(
+        folder / "run.mat",
+        {"logs": {"omega": series, "v": series | {"Units": "m/s", "Data": table["ground_speed"].to_numpy()}}},
+    )
+    page.goto(f"{served.url}/#/start?log=run.mat")
+    page.wait_for_selector(".bad:has-text('This log has no wheel speed')")
+    assert page.input_value("#column-ground_speed") == "logs.v"
+    assert page.input_value("#column-angular_velocity_z") == ""
+    page.select_option("#column-wheel_speed_fl", "logs.omega[0]")
+    page.wait_for_selector(".bad:has-text('This log has no wheel speed')", state="detached")
+    page.fill("#profile-output", "profile.txt")
+    page.click("#use-columns")
+    page.wait_for_selector(".note.error")
+    page.click("nav >> text=Fit")  # an error stays, but not for another page's user
+    page.wait_for_selector(".note.error", state="detached")

@@ -2,6 +2,7 @@ import { Notices } from "./ui/api";
 import { foldChoosers } from "./ui/choosers";
 import { fill, h } from "./ui/dom";
 import { keepFocus } from "./ui/focus";
+import { leaveNotes } from "./ui/notes";
 import { startTheme, switchTheme } from "./ui/theme";
 import { startUnits, unitsChooser } from "./ui/units";
 import type { Page } from "./ui/page";
@@ -39,6 +40,7 @@ async function open(): Promise<void> {
   if (turn !== opened) return;
   unloaded = page === missing;
   leave?.();
+  leaveNotes();
   main.className = `page-${unloaded ? "start" : name}`;
   fill(main);
   leave = page(main, { notices, query });

@@ -204,6 +204,7 @@ def _of_motion(column: Column) -> list[Hint]:
         and not name.has("wheel", "motor")
         and not name.wheel
         and not _in_turns(column.unit)
+        and not column.one_of_several  # more likely a wheel
     ):
         return [("angular_velocity_z", 0.3, "turns, of an unknown part")]
     if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position", "lateral"):

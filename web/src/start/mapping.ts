@@ -62,6 +62,7 @@ export class Mapping {
   private look: Look | undefined;
   private chosen = new Map<string, Choice>();
   private rows = new Map<string, HTMLElement>();
+  private readonly refused = h("p", { class: "bad" });
   private wheels: string[] = [];
   private own = ""; // the profile written by this page, which it may overwrite
   readonly names = new WheelNames(() => this.nameRows());
@@ -129,9 +130,10 @@ export class Mapping {
     const use = h("button", { type: "button", class: "primary", id: "use-columns", click: () => void this.save(name.value.trim()) }, "Use these columns");
     const needed = look.channels.filter((channel) => channel.wheel || this.chosen.has(channel.name) || ["ground_speed", "wheel_based_speed", "drawbar_force"].includes(channel.name));
     const other = look.channels.filter((channel) => !needed.includes(channel));
+    this.sayRefused();
     fill(
       this.element,
-      look.refused ? h("p", { class: "bad" }, `This log ${look.refused}.`) : null,
+      this.refused,
       h("p", { class: "hint" }, "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
       look.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
@@ -140,6 +142,12 @@ export class Mapping {
       h("details", {}, h("summary", {}, `${other.length} more channels that help, if the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
       h("div", { class: "row" }, h("label", { for: name.id }, "Save as"), name, use),
     );
+  }
+
+  /** What the log lacked as it was proposed, until a speed of the wheels is chosen. */
+  private sayRefused(): void {
+    const refused = this.look?.refused && this.signals === "bus-speed" && !this.chosen.has("wheel_based_speed") ? this.look.refused : "";
+    fill(this.refused, refused ? `This log ${refused}. If it has a wheel's speed by another name, choose it.` : null);
   }
 
   private timeRow(look: Look): HTMLElement {
@@ -181,6 +189,7 @@ export class Mapping {
     select.append(group);
     select.addEventListener("change", () => {
       this.choose(channel, select.value);
+      this.sayRefused();
       this.fillRow(channel, box);
       document.getElementById(select.id)?.focus();
     });
