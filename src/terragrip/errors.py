@@ -73,6 +73,18 @@ def missing_package(
     )
 
 
+def reason_of(error: Exception, no_memory: str = "not enough memory") -> str:
+    """Why one of many failed while the others go on, in one line: what the user gave, memory, a file, or a defect of ours."""
+    text = f"a defect of Terragrip ({type(error).__name__}: {error})"
+    if isinstance(error, InputError):
+        text = str(error)
+    elif isinstance(error, MemoryError):
+        text = no_memory
+    elif isinstance(error, OSError):
+        text = f"a file cannot be read or written ({error})"
+    return " ".join(text.split())
+
+
 def system_error(error: BaseException) -> int | None:
     """The system's number (errno) of a failure or of what caused it; Arrow and Polars put it into their text. None where there is none."""
     cause: BaseException | None = error

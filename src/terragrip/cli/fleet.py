@@ -92,7 +92,7 @@ def command(
     import time
 
     from terragrip.estimation.methods import method_named
-    from terragrip.fleet.cells import require_maps
+    from terragrip.fleet.extra import require_maps
     from terragrip.fleet.logs import fleet_logs, matching, on_disk
     from terragrip.fleet.store import is_remote
     from terragrip.report.page import require_drawing

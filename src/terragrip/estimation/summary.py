@@ -42,19 +42,23 @@ class Tally:
     _every: int = 1
     _sampled: int = 0
 
-    def add(self, block: Estimates) -> None:
-        """Count a block that follows the ones before it."""
+    def count(self, block: Estimates) -> None:
+        """Rows, duration, distance, events and NIS of a block that follows the ones before it."""
         if self._first is None:
             self._first, self.about, self.wheels = float(block.time[0]), block.about, block.wheels
         self.rows += len(block)
         self.duration = float(block.time[-1]) - self._first
         if "distance" in block:
-            self.distance = float(np.nanmax(block["distance"]))
+            self.distance = float(np.nanmax(block["distance"], initial=self.distance))
         self._count_events(block.event_codes)
         if "nis" in block and "channels" in block:
             moves = block.event_codes != STANDSTILL  # a machine at rest is quieter than its sensors' noise
             self.nis += float(np.nansum(block["nis"][moves]))
             self.channels += float(np.nansum(block["channels"][moves]))
+
+    def add(self, block: Estimates) -> None:
+        """`count` a block, and sample its rows for medians."""
+        self.count(block)
         moving = np.flatnonzero(block.event_codes == 0)
         chosen = moving[:: max(1, len(moving) // _SAMPLE)]
         chosen = chosen[:: self._every]

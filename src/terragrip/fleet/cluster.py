@@ -8,7 +8,7 @@ import re
 import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from typing import Any
 
@@ -88,34 +88,29 @@ def workers_at(scheduler: str | None, workers: int, memory: str | None) -> Itera
     for name in [*logging.root.manager.loggerDict]:
         if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    with dask.config.set(_CONFIG):
+    with dask.config.set(_CONFIG), ExitStack() as opened:
         if scheduler is not None:
             pool = Pool(lambda: _client(scheduler), scheduler)
-            try:
-                pool.connect(CONNECT_TIMEOUT)
-                pool.check_versions()
-                yield pool
-            finally:
-                pool.close()
-            return
-        limit: Any = "auto" if memory is None else _bytes(memory)
-        with distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            memory_limit=limit,
-            dashboard_address=":0",  # any free port, without a warning
-            silence_logs=logging.CRITICAL,
-        ) as cluster:
+        else:
+            limit: Any = "auto" if memory is None else _bytes(memory)
+            cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                memory_limit=limit,
+                dashboard_address=":0",  # any free port, without a warning
+                silence_logs=logging.CRITICAL,
+            )
+            opened.enter_context(cluster)
             pool = Pool(
                 lambda: distributed.Client(cluster, set_as_default=False),
                 "this machine",
                 lambda: cluster.scale(workers),
             )
-            try:
-                pool.connect(CONNECT_TIMEOUT)
-                yield pool
-            finally:
-                pool.close()
+        opened.callback(pool.close)
+        pool.connect(CONNECT_TIMEOUT)
+        if scheduler is not None:
+            pool.check_versions()
+        yield pool
 
 
 def check_address(address: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -107,6 +108,9 @@ def fleet_logs(
     InputError: no log is left; two logs share a name; a log has no vehicle; a row of the index matches no log; two different vehicles
         share a name; a vehicle or profile file is invalid.
     """
+    from terragrip.formats import Profile
+    from terragrip.vehicle import Vehicle
+
     entries = {} if index is None else _entries(index, [url for url, _ in files])
     named = (
         index,
@@ -115,8 +119,9 @@ def fleet_logs(
         *(path for one in entries.values() for path in (one.vehicle, one.profile)),
     )
     own = {os.path.abspath(path) for path in named if path is not None}
-    machines, profiles = _Machines(), _Profiles()
+    load_vehicle, load_profile = cache(Vehicle.load), cache(Profile.load)
     names: dict[str, str] = {}
+    machines: dict[str, Path] = {}
     logs = []
     for url, size in files:
         if url in own:
@@ -140,8 +145,19 @@ def fleet_logs(
                 hint="rename one, or set names in the column `name` of an --index",
             )
         names[name] = url
-        machine, loaded = machines.of(path)
-        logs.append(FleetLog(name, url, size, machine, loaded, profiles.of(entry.profile or profile)))
+        loaded, read_by = load_vehicle(path), entry.profile or profile
+        machine = loaded.name or path.stem
+        other = machines.setdefault(machine, path)
+        if other != path and load_vehicle(other) != loaded:
+            raise InputError(
+                f"has the name {machine!r} of another vehicle, {other}",
+                file=path,
+                place="name",
+                hint="give each its own name",
+            )
+        logs.append(
+            FleetLog(name, url, size, machine, loaded, None if read_by is None else load_profile(read_by))
+        )
     if not logs:
         raise _no_match(files[0][0] if files else None)
     return logs
@@ -171,44 +187,3 @@ def _entries(index: Path, urls: Sequence[str]) -> dict[str, _Entry]:
         vehicle = index.parent / row["vehicle"] if row.get("vehicle") else None
         entries[whole] = _Entry(vehicle, profile_in(index, row.get("profile", "")), row.get("name", ""))
     return entries
-
-
-class _Machines:
-    """Vehicles by file, each loaded once."""
-
-    def __init__(self) -> None:
-        self._loaded: dict[Path, tuple[str, Vehicle]] = {}
-        self._files: dict[str, Path] = {}
-
-    def of(self, path: Path) -> tuple[str, Vehicle]:
-        from terragrip.vehicle import Vehicle
-
-        if path not in self._loaded:
-            vehicle = Vehicle.load(path)
-            name = vehicle.name or path.stem
-            other = self._files.setdefault(name, path)
-            if other != path and self._loaded[other][1] != vehicle:
-                raise InputError(
-                    f"has the name {name!r} of another vehicle, {other}",
-                    file=path,
-                    place="name",
-                    hint="give each its own name",
-                )
-            self._loaded[path] = (name, vehicle)
-        return self._loaded[path]
-
-
-class _Profiles:
-    """Profiles by file, each loaded once."""
-
-    def __init__(self) -> None:
-        self._loaded: dict[Path, Profile] = {}
-
-    def of(self, path: Path | None) -> Profile | None:
-        from terragrip.formats import Profile
-
-        if path is None:
-            return None
-        if path not in self._loaded:
-            self._loaded[path] = Profile.load(path)
-        return self._loaded[path]

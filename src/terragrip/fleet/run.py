@@ -77,8 +77,8 @@ def run_fleet(
     output: a folder, or the address of a store that fsspec knows.
     method, smooth, dbc: as for :func:`terragrip.from_log.estimate_file`.
     scheduler: address of a Dask scheduler; None: ``workers`` processes on this machine, each with ``memory`` ("2GB"; None: an equal share).
-    maps: also map each log that has positions (`terragrip.fleet.cells`).
-    ground: also find each log's sections and events (`terragrip.fleet.ground`).
+    maps: also map each log that has positions (`terragrip.fleet.extra`).
+    ground: also find each log's sections and events (`terragrip.fleet.extra`).
     progress: called with the number of finished logs and of all.
 
     Raises

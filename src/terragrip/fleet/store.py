@@ -64,12 +64,6 @@ class Store:
         system, root = url_to_fs(self.url)
         return system, str(root).rstrip("/")
 
-    def __getstate__(self) -> dict[str, str]:
-        return {"url": self.url}
-
-    def __setstate__(self, state: dict[str, str]) -> None:
-        self.__dict__.update(state)
-
     @property
     def is_local(self) -> bool:
         """Whether it is a folder on this machine."""

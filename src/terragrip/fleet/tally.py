@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from terragrip.estimation.columns import driven_of, wheels_with
 from terragrip.estimation.engine import EVENTS
-from terragrip.estimation.summary import STANDSTILL
+from terragrip.estimation.summary import Tally
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -39,43 +39,28 @@ class LogTally:
     """Accumulates the blocks of one log."""
 
     def __init__(self) -> None:
-        self.rows = 0
-        self.about: dict[str, Any] = {}
+        self.total = Tally()
         self.notes: dict[str, None] = {}
-        self.starts = dict.fromkeys(COUNTED, 0)
         self._sums: dict[str, dict[str, Array]] = {}
-        self._first = self._last = self._distance = 0.0
-        self._code = 0
+        self._last: float | None = None  # time
         self._sampled = -np.inf
         self._samples: list[Estimates] = []
-        self._nis = self._channels = 0.0
 
     def add(self, block: Estimates) -> None:
         """Add the next block."""
-        time, distance = block.time, block["distance"] if "distance" in block else np.zeros(len(block))
-        if not self.rows:
-            self._first, self._last, self.about = float(time[0]), float(time[0]), block.about
-        self.notes.update(dict.fromkeys(block.notes))
-        self.rows += len(block)
-        changed = np.flatnonzero(np.diff(block.event_codes, prepend=np.uint8(self._code)))
-        for code in block.event_codes[changed]:
-            if EVENTS[code]:
-                self.starts[EVENTS[code]] += 1
-        if "nis" in block and "channels" in block:
-            # As in the summary of one log: at standstill, NIS is far below its expected value.
-            moves = block.event_codes != STANDSTILL
-            self._nis += float(np.nansum(block["nis"][moves]))
-            self._channels += float(np.nansum(block["channels"][moves]))
-        self._add_means(block, distance)
+        self._add_means(block)
         self._sample(block)
-        self._code, self._last = int(block.event_codes[-1]), float(time[-1])
-        self._distance = float(np.nanmax(distance, initial=self._distance))
+        self.notes.update(dict.fromkeys(block.notes))
+        self.total.count(block)
+        self._last = float(block.time[-1])
 
-    def _add_means(self, block: Estimates, distance: Array) -> None:
+    def _add_means(self, block: Estimates) -> None:
         """Weight each row by the time since the previous one, limited to the gap threshold."""
         longest = block.about.get("settings", {}).get("gap") or 1.0
-        durations = np.clip(np.diff(block.time, prepend=self._last), 0.0, longest)
-        metres = np.diff(distance, prepend=self._distance)
+        last = block.time[0] if self._last is None else self._last
+        durations = np.clip(np.diff(block.time, prepend=last), 0.0, longest)
+        distance = block["distance"] if "distance" in block else np.zeros(len(block))
+        metres = np.diff(distance, prepend=self.total.distance)
         usable = block.event_codes == 0
         soil = block.labels.get("soil", np.full(len(block), "", dtype=object))
         columns = {name: _mean_of(block, name) for name in MEANS}
@@ -114,15 +99,19 @@ class LogTally:
         whole = {
             name: sum((one[name] for one in self._sums.values()), np.zeros(2)) for name in ("moving", *MEANS)
         }
-        channels = self.about.get("recording", {})
+        total = self.total
         return {
-            "start": channels.get("start"),
-            "rows": self.rows,
-            "duration": self._last - self._first,
-            "distance": self._distance,
+            "start": total.about.get("recording", {}).get("start"),
+            "rows": total.rows,
+            "duration": total.duration,
+            "distance": total.distance,
             **_means(whole),
-            "nis": self._nis / self._channels if self._channels else None,
-            **{f"{name}_events": count for name, count in self.starts.items()},
+            "nis": total.nis / total.channels if total.channels else None,
+            **{
+                f"{name}_events": count
+                for name, count in zip(EVENTS, total.event_starts, strict=True)
+                if name
+            },
             "soils": ", ".join(sorted(name for name in self._sums if name)),
             "notes": " ".join(self.notes),
         }

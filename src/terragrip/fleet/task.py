@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from terragrip.errors import InputError, system_error
+from terragrip.errors import InputError, reason_of, system_error
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.store import Store, fetched, safe_name
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
+    from terragrip.fleet.extra import Extra
     from terragrip.fleet.tally import LogTally
 
 Result = TypeVar("Result")
@@ -28,6 +27,7 @@ NO_DAY = "__HIVE_DEFAULT_PARTITION__"
 """The day partition of logs without a clock; readers of Hive partitions see null."""
 NOTES, SAMPLES, ESTIMATES = "state/logs", "state/samples", "estimates"
 """Folders within a data set."""
+_NO_MEMORY = "not enough memory; raise --memory or split the log"
 
 
 @dataclass(frozen=True)
@@ -94,21 +94,7 @@ def _attempt(log: FleetLog, step: Callable[..., Result], *given: Any) -> Result 
         number = system_error(error)
         full = number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
         refused = isinstance(error, InputError) and number is None
-        return Outcome(log.name, reason=_in_one_line(_reason(error)), disk_full=full, refused=refused)
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, InputError):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "not enough memory; raise --memory or split the log"
-    if isinstance(error, OSError):
-        return f"the log could not be read or its estimates could not be written ({error})"
-    return f"a defect of Terragrip ({type(error).__name__}: {error})"
-
-
-def _in_one_line(text: str) -> str:
-    return " ".join(text.split())
+        return Outcome(log.name, reason=reason_of(error, _NO_MEMORY), disk_full=full, refused=refused)
 
 
 def _estimated(
@@ -118,6 +104,7 @@ def _estimated(
     import pyarrow.parquet as pq
 
     from terragrip import __version__
+    from terragrip.fleet.extra import Extra
     from terragrip.fleet.tally import LogTally
     from terragrip.from_log import estimate_file
 
@@ -148,7 +135,7 @@ def _estimated(
             observe=tally.add,
             summary=False,
         )
-    extra = Extra.of(local, log.name, settings)
+    extra = Extra.of(local, log.name, maps=settings.maps, ground=settings.ground)
     note = make_note(log, key, settings, tally, extra)
     files = [(local, note["file"])]
     for name, table in extra.tables.items():
@@ -173,39 +160,6 @@ def is_whole(note: Mapping[str, Any], store: Store) -> bool:
     )
 
 
-@dataclass(frozen=True)
-class Extra:
-    """Optional results beside a log's estimates: ``tables`` by folder, and the reasons for those that are missing."""
-
-    tables: Mapping[str, pa.Table]
-    no_map: str = ""
-    no_ground: str = ""
-
-    @classmethod
-    def of(cls, estimates: Path, log: str, settings: Settings) -> Extra:
-        """The optional results of a file of estimates."""
-        tables: dict[str, pa.Table] = {}
-        no_map = no_ground = ""
-        if settings.maps:
-            from terragrip.fleet.cells import cells_of_log
-
-            try:
-                cells = cells_of_log(estimates, log)
-            except InputError as error:
-                no_map = _in_one_line(str(error))
-            else:
-                no_map = "" if cells is not None else "has no positions"
-                tables |= {} if cells is None else {"cells": cells}
-        if settings.ground:
-            from terragrip.fleet.ground import ground_of_log
-
-            try:
-                tables |= ground_of_log(estimates, log)
-            except InputError as error:
-                no_ground = _in_one_line(str(error))
-        return cls(tables, no_map, no_ground)
-
-
 def _put(staged: Outcome | _Staged, store: Store) -> Outcome:
     if isinstance(staged, Outcome):
         return staged
@@ -223,7 +177,7 @@ def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extr
     return {
         "log": log.name,
         "key": key,
-        "content": tally.about.get("recording", {}).get("sha256"),
+        "content": tally.total.about.get("recording", {}).get("sha256"),
         "file": f"{ESTIMATES}/{place}",
         "extra": {name: f"{name}/{place}" for name in extra.tables},
         "sample": bool(tally.sample),
@@ -231,7 +185,7 @@ def make_note(log: FleetLog, key: str, settings: Settings, tally: LogTally, extr
             "vehicle": log.machine,
             "day": day,
             "source": log.url,
-            "method": str(tally.about.get("method", settings.method)),
+            "method": str(tally.total.about.get("method", settings.method)),
             "smooth": settings.smooth,
             "version": settings.version,
             **row,
