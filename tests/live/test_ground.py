@@ -10,11 +10,10 @@ import pytest
 from drives import drive
 from machine import events, rows_of
 from terragrip.estimation import TractionEstimator
-from terragrip.ground.live import LiveGround
+from terragrip.ground.live import GroundState, LiveGround
 from terragrip.live import read_record
 from terragrip.live.core import Core, Settings
 from terragrip.live.options import Options
-from terragrip.live.outputs import Ground
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary
@@ -54,7 +53,7 @@ def test_a_restart_goes_on_with_the_same_ground(tmp_path, recording, library, ve
     for first, last in ((0, 1234), (1234, 2222), (2222, len(rows))):
         pipeline = Pipeline(Core(vehicle, settings, library), tmp_path, rows=700)
         for time, values in rows[first:last]:
-            got += [out for out in pipeline.process(time, 0, time, values) if isinstance(out, Ground)]
+            got += [out for out in pipeline.process(time, 0, time, values) if isinstance(out, GroundState)]
         pipeline.write()
         pipeline.recorder.abandon() if last < len(rows) else pipeline.close()
     estimates, states = by_hand

@@ -159,15 +159,16 @@ def test_a_replayed_log_is_recorded_as_slip(tmp_path: Path, capfd: pytest.Captur
     assert "need drive torques" in capfd.readouterr().err
 
 
-def test_sinks_get_the_columns_there_are() -> None:
+@pytest.mark.asyncio
+async def test_sinks_get_the_columns_there_are() -> None:
     from terragrip.formats import Profile
 
     profile = Profile.from_dict({"channels": {name: name for name in CHANNELS}})
     service = Service(calibrated(), ["udp://127.0.0.1:0"], ["studio://127.0.0.1:0"], profile=profile)
-    broadcast = service.sinks[0][1].broadcast
-    assert broadcast.wheels == ("drive",)
-    assert "slip_drive" in broadcast.columns
-    assert not any(name.startswith("adhesion") for name in broadcast.columns)
+    hello = json.loads(await anext(service.sinks[0][1].broadcast.subscribe()))
+    assert hello["wheels"] == ["drive"]
+    assert "slip_drive" in hello["columns"]
+    assert not any(name.startswith("adhesion") for name in hello["columns"])
 
 
 def test_can_frames_give_the_drives_slip_for_each_driven_wheel() -> None:

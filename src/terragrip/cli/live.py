@@ -122,6 +122,7 @@ def command(
     # Before pyarrow loads: its own allocator keeps 5 MB more, for a record that writes once a minute.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     from terragrip.live.options import Options
+    from terragrip.live.status import table, table_of_many
     from terragrip.live.topics import VEHICLE
 
     if quiet and not sink and record is None:
@@ -131,10 +132,10 @@ def command(
         log_to_stderr(log_format)
     known = _settings(settings)
     options = Options(
-        method,
-        window / 1000.0,
-        {**known["held"], **_held(held or [])},
-        known["noise"],
+        method=method,
+        window=window / 1000.0,
+        held={**known["held"], **_held(held or [])},
+        noise=known["noise"],
         learn=settings is None,
         ground=ground,
         library=_library(library),
@@ -145,8 +146,6 @@ def command(
     service: Service | ManyService
     screen: Callable[[], Any]
     if not many:
-        from terragrip.live.status import table
-
         service = _one(source, sink or [], vehicle, profile, record, options)
         screen = partial(table, service)
     elif settings is not None:
@@ -154,8 +153,6 @@ def command(
             "are those of one machine", place="--settings", hint="put the noise into the vehicle files"
         )
     else:
-        from terragrip.live.many.status import table as table_of_many
-
         service = _many(source, sink or [], vehicle, profile, index, record, options, (max_vehicles, memory))
         screen = partial(table_of_many, service)
     from terragrip.log_events import emit

@@ -41,6 +41,17 @@ class GroundState:
     known: bool
     change: Change | None
 
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it; of the change how certain it is."""
+        change = self.change
+        return {
+            "time": self.time,
+            "soil": self.soil,
+            "probability": self.probabilities[self.soil],
+            "probabilities": dict(self.probabilities),
+            "change": change and {"time": change.time, "std": change.std, "probability": change.probability},
+        }
+
 
 class LiveGround:
     """Follows the ground along the estimates of one drive.

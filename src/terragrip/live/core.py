@@ -22,7 +22,7 @@ from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.rims import DRIVE, speeds_alone
 from terragrip.live.clock import Pace, SourceClock, Stamped
 from terragrip.live.counts import Counts
-from terragrip.live.outputs import Event, Output, Refusal, Row, Values, of_ground
+from terragrip.live.outputs import Event, Output, Refusal, Row, Values
 from terragrip.live.reorder import Pending, Reorder
 from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
@@ -54,7 +54,7 @@ class Settings:
     ``driveline``: what an earlier log showed of a machine with engine torque (`terragrip.estimation.engine_estimator`).
     """
 
-    sources: tuple[str, ...]
+    sources: tuple[str, ...] = ()
     method: str = DEFAULT
     window: float = WINDOW
     channels: tuple[str, ...] = ()
@@ -221,7 +221,10 @@ class Core:
             if self.ground is not None:
                 state = self.ground.update(estimate)
                 if state is not None:
-                    out += of_ground(state)
+                    out.append(state)
+                    if (change := state.change) is not None:
+                        text = f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
+                        out.append(Event(state.time, "ground_change", "ground", text))
             if self.learner is not None:
                 self._learn(estimator, self.learner, row, out)
         out += [

@@ -9,6 +9,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any
 
 from terragrip.live.outputs import Values
@@ -22,6 +23,14 @@ def steady_clock() -> Callable[[], float]:
     """A clock that gives s since 1970 and never steps."""
     ahead, now = time.time() - time.monotonic(), time.monotonic
     return lambda: now() + ahead
+
+
+async def newly_set(event: asyncio.Event, seconds: float | None) -> None:
+    """Clear an event and wait until it is set again, at most so long; None: for ever."""
+    event.clear()
+    with suppress(TimeoutError):
+        async with asyncio.timeout(None if seconds is None else max(seconds, 0.0) + 1e-4):
+            await event.wait()
 
 
 class Inbox:
@@ -86,15 +95,7 @@ class Inbox:
         if not self.is_empty:
             await asyncio.sleep(0)
             return
-        self._filled.clear()
-        if until is None:
-            await self._filled.wait()
-            return
-        try:
-            async with asyncio.timeout(max(until - self.clock(), 0.0) + 1e-4):
-                await self._filled.wait()
-        except TimeoutError:
-            pass
+        await newly_set(self._filled, None if until is None else until - self.clock())
 
     async def room(self) -> None:
         """Wait until at least half of the place is free: for sources that can wait."""

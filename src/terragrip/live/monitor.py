@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
 from terragrip.live.counts import FATES
@@ -17,8 +18,28 @@ Family = tuple[str, str, str, list[tuple[Labels, float]]]
 LIVE, READY = "/health/live", "/health/ready"
 
 
-class Monitor:
-    """Answers by path. It reads `Statistics` and what these count; it counts nothing."""
+class Answers(ABC):
+    """Answers by path."""
+
+    def answer(self, path: str) -> tuple[int, str] | None:
+        """HTTP status and text for a path; None where it is none of ours."""
+        if path == LIVE:
+            return 200, "alive\n"
+        if path == METRICS:
+            return 200, self.metrics()
+        return self.ready(path.removeprefix(READY)) if path.startswith(READY) else None
+
+    @abstractmethod
+    def ready(self, path: str) -> tuple[int, str] | None:
+        """Whether data come; ``path``: what stands behind `READY`."""
+
+    @abstractmethod
+    def metrics(self) -> str:
+        """Everything counted, as Prometheus reads it (docs/live.md)."""
+
+
+class Monitor(Answers):
+    """Of one vehicle. It reads what others count; it counts nothing."""
 
     def __init__(
         self, statistics: Statistics, inbox: Inbox, outboxes: Sequence[Outbox], pipeline: Pipeline
@@ -26,19 +47,15 @@ class Monitor:
         self._statistics, self._inbox, self._outboxes = statistics, inbox, outboxes
         self._pipeline = pipeline
 
-    def answer(self, path: str) -> tuple[int, str] | None:
-        """HTTP status and text for a path; None where it is none of ours."""
-        if path == LIVE:
-            return 200, "alive\n"
-        if path == READY:
-            why = self.unready()
-            return (200, "getting data\n") if why is None else (503, f"{why}\n")
-        if path == METRICS:
-            return 200, self.metrics()
-        return None
+    def ready(self, path: str) -> tuple[int, str] | None:
+        """See `Answers`."""
+        if path:
+            return None
+        why = self.unready()
+        return (200, "getting data\n") if why is None else (503, f"{why}\n")
 
     def metrics(self) -> str:
-        """Everything counted, as Prometheus reads it (docs/live.md)."""
+        """See `Answers`."""
         page = Metrics()
         page.add(
             "gauge", "terragrip_live_ready", "1 if /health/ready answers 200.", int(self.unready() is None)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
 from terragrip.estimation.engine_estimator import EngineEstimator
-from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.live.core import WINDOW, Core, Settings
+from terragrip.estimation.methods import method_named
+from terragrip.live.core import Core, Settings
 from terragrip.live.setpoint import LiveSetpoint
 
 if TYPE_CHECKING:
@@ -20,25 +20,17 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Options:
-    """What the command line says besides sources, sinks and vehicle.
+class Options(Settings):
+    """What the command line says besides sinks and vehicle: a run's `Settings`, whose ``sources`` and ``channels`` `core` fills in.
 
-    ground: report ground changes while driving; library: and which of these soils it is.
+    library: name which of these soils the ground is.
     setpoint: slip and ground speed wanted [m/s] of the set-point to publish beside the estimates; None: none is.
-    All others are those of a run's `Settings`.
 
     Raises InputError on an unknown method.
     """
 
-    method: str = DEFAULT
-    window: float = WINDOW
-    held: Mapping[str, float] = field(default_factory=dict)
-    noise: Mapping[str, float] = field(default_factory=dict)
-    learn: bool = True
-    ground: bool = False
     library: SoilLibrary | None = None
     setpoint: tuple[float, float] | None = None
-    driveline: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         method_named(self.method)
@@ -63,17 +55,9 @@ class Options:
         ``sources``: their names in the record. ``channels``: columns that they promise; empty: those of the first row.
         Raises InputError where the channels cannot give what is wanted.
         """
-        settings = Settings(
-            tuple(sources),
-            self.method,
-            self.window,
-            tuple(dict.fromkeys(channels)),
-            dict(self.held),
-            self.ground or self.library is not None,
-            dict(self.noise),
-            self.learn,
-            self.driveline,
-        )
+        given = {one.name: getattr(self, one.name) for one in fields(Settings)}
+        known = {"sources": tuple(sources), "channels": tuple(dict.fromkeys(channels))}
+        settings = Settings(**{**given, **known, "ground": self.ground or self.library is not None})
         core = Core(vehicle, settings, self.library)
         setpoint = None if self.setpoint is None else LiveSetpoint(vehicle, *self.setpoint)
         if core.estimator is not None:

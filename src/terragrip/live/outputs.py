@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimator import Estimate
@@ -49,39 +48,4 @@ class Refusal:
     values: Values
 
 
-@dataclass(frozen=True, slots=True)
-class Ground:
-    """The ground at the end of half a second: the most probable soil, the probability of each, and a change reported now."""
-
-    time: float
-    soil: str
-    probabilities: Mapping[str, float]
-    change: Mapping[str, float] | None  # time, std, probability
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        return {
-            "time": self.time,
-            "soil": self.soil,
-            "probability": self.probabilities[self.soil],
-            "probabilities": dict(self.probabilities),
-            "change": None if self.change is None else dict(self.change),
-        }
-
-
-Output = Row | Event | Refusal | Ground
-
-
-def of_ground(state: GroundState) -> list[Output]:
-    """A block's state as outputs of ours; with an event where the ground changes."""
-    change = state.change
-    if change is None:
-        return [Ground(state.time, state.soil, state.probabilities, None)]
-    numbers = {"time": change.time, "std": change.std, "probability": change.probability}
-    text = (
-        f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
-    )
-    return [
-        Ground(state.time, state.soil, state.probabilities, numbers),
-        Event(state.time, "ground_change", "ground", text),
-    ]
+Output: TypeAlias = "Row | Event | Refusal | GroundState"

@@ -93,21 +93,13 @@ def locked(folder: Path) -> int:
 
 def refuse_other(folder: Path, kept: Core, wanted: Core) -> None:
     before, now = kept.settings.to_dict(), wanted.settings.to_dict()
-    for name in before:
-        if before[name] != now[name]:
-            raise InputError(
-                f"the record was made with {name} {before[name]}, not {now[name]}",
-                file=folder, place="--record", hint="give the same, or choose another folder",
-            )  # fmt: skip
     soils = [None if one is None else one.to_dict() for one in (kept.library, wanted.library)]
-    for what, same in (
-        ("vehicle file", kept.vehicle.to_dict() == wanted.vehicle.to_dict()),
-        ("soil library", soils[0] == soils[1]),
-    ):
-        if same:
-            continue
+    others = [f"{name} {before[name]}, not {now[name]}" for name in before if before[name] != now[name]]
+    others += ["another vehicle file"] if kept.vehicle.to_dict() != wanted.vehicle.to_dict() else []
+    others += ["another soil library"] if soils[0] != soils[1] else []
+    if others:
         raise InputError(
-            f"the record was made with another {what}", file=folder, place="--record",
+            f"the record was made with {others[0]}", file=folder, place="--record",
             hint="give the same, or choose another folder",
         )  # fmt: skip
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.files import sync
-from terragrip.live.outputs import Event, Ground, Output, Refusal, Row
+from terragrip.live.outputs import Event, Output, Refusal, Row
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
+    from terragrip.ground.live import GroundState
 
 _CODES = {event: code for code, event in enumerate(EVENTS)}
 RECORDING, ESTIMATES, REFUSED, EVENT_LINES, GROUND = "recording", "estimates", "refused", "events", "ground"
@@ -41,7 +42,7 @@ class Segment:
     """Of the channels that came together, the places of their rows, and their values one behind the other."""
     refusals: list[Refusal] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
-    ground: list[Ground] = field(default_factory=list)
+    ground: list[GroundState] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -62,10 +63,10 @@ class Segment:
             self.estimates.extend(estimate.values)
         elif isinstance(output, Event):
             self.events.append(output)
-        elif isinstance(output, Ground):
-            self.ground.append(output)
-        else:
+        elif isinstance(output, Refusal):
             self.refusals.append(output)
+        else:
+            self.ground.append(output)
 
     def channels(self) -> dict[str, npt.NDArray[np.float64]]:
         """What was measured, a column (n,) each; NaN where a row has none."""

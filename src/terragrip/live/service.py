@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
-from terragrip.live.core import Core
 from terragrip.live.counts import FATES
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.inbox import CAPACITY, Inbox
@@ -27,8 +26,8 @@ if TYPE_CHECKING:
 HOUSEKEEPING = 0.09  # s: what came in is handed to the system at least ten times a second
 
 
-class Service:
-    """Runs until its sources end or `stop` is called.
+class Service(VehicleRun):
+    """One vehicle's run with its links. Runs until its sources end or `stop` is called.
 
     Parameters
     ----------
@@ -68,26 +67,18 @@ class Service:
             for decoder, source in zip(decoders, self.sources, strict=True)
             for name in (*options.promised(decoder, vehicle), *getattr(source, "channels", ()))
         ]
-        core, self.setpoint = options.core(vehicle, self.source_names, channels)
+        core, setpoint = options.core(vehicle, self.source_names, channels)
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
-        self.inbox = Inbox(capacity)
-        self.outboxes = [Outbox(uri, self.inbox) for uri, _ in self.sinks]
-        self.is_real_time = all(source.real_time for source in self.sources)
-        self.run_of_vehicle = one = VehicleRun(
-            core, self.inbox, decoders, self.outboxes, profile=profile, record=record, setpoint=self.setpoint,
-            is_real_time=self.is_real_time,
+        inbox = Inbox(capacity)
+        self.outboxes = [Outbox(uri, inbox) for uri, _ in self.sinks]
+        super().__init__(
+            core, inbox, decoders, self.outboxes, profile=profile, record=record, setpoint=setpoint,
+            is_real_time=all(source.real_time for source in self.sources),
         )  # fmt: skip
-        self.pipeline, self.feeds, self.statistics = one.pipeline, one.feeds, one.statistics
-        self.listeners = one.listeners
         self._stopping = asyncio.Event()
         for _, sink in self.sinks:
             if hasattr(sink, "monitor"):
                 sink.monitor = Monitor(self.statistics, self.inbox, self.outboxes, self.pipeline)
-
-    @property
-    def core(self) -> Core:
-        """What is known of the run so far."""
-        return self.pipeline.core
 
     def totals(self) -> dict[str, Any]:
         """What the log's last line says: rows, and values by what became of them."""
@@ -112,11 +103,12 @@ class Service:
         ]
         sinks = [(sink, outbox) for (_, sink), outbox in zip(self.sinks, self.outboxes, strict=True)]
         try:
-            self.run_of_vehicle.open()
+            self.open()
             await run_links(
-                sources, sinks, [self._stopping.wait(), self._estimate(), self._housekeeping()],
-                has_left=lambda: bool(self.inbox.samples), finish=self.run_of_vehicle.finish,
+                sources, sinks, [self._stopping.wait(), self._estimate(), self._look_after()],
+                has_left=lambda: bool(self.inbox.samples), finish=self.finish,
             )  # fmt: skip
+            self.turn()  # what sinks reported as they ended
         finally:
             self.pipeline.close()
         if self.pipeline.failure:
@@ -130,9 +122,9 @@ class Service:
             await self.inbox.filled(self.pipeline.waiting_until if self.is_real_time else None)
             while not self.is_real_time and any(outbox.is_busy for outbox in self.outboxes):
                 await asyncio.sleep(PAUSE)
-            self.run_of_vehicle.turn()
+            self.turn()
 
-    async def _housekeeping(self) -> None:
+    async def _look_after(self) -> None:
         while True:
             await asyncio.sleep(HOUSEKEEPING)
-            self.run_of_vehicle.housekeeping()
+            self.housekeeping()

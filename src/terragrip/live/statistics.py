@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from terragrip.live.core import Core
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
-from terragrip.live.outputs import Event, Ground, Row
+from terragrip.live.outputs import Event, Row
 from terragrip.live.pulse import Pulse
+
+if TYPE_CHECKING:
+    from terragrip.ground.live import GroundState
 
 _BEHIND = 1.0  # s
 _SILENT = 1.0  # s, or ten periods
@@ -33,7 +36,7 @@ class Statistics:
         self.period = 0.0  # s between rows, lately
         self.row_rate = self.sample_rate = self.delay = 0.0
         self.last: Row | None = None
-        self.ground: Ground | None = None
+        self.ground: GroundState | None = None
         self.events: deque[Event] = deque(maxlen=50)
         self.event_counts: dict[str, int] = {}
         self.pulses = [Pulse(feed, now) for feed in feeds]
@@ -44,7 +47,7 @@ class Statistics:
         self.last_row = now
         self._began = now  # the second that runs
         self._before = (0, 0, 0.0)  # rows, samples, delays when it began
-        self._synced = self._behind = now - _EVERY
+        self._behind = now - _EVERY
         self._dropped = 0
 
     def now(self) -> float:
@@ -120,13 +123,6 @@ class Statistics:
         self.row_rate, self.sample_rate = rows / span, (self.samples_in - samples) / span
         self.delay = (self.delays - delays) / rows if rows else 0.0
         self._began, self._before = now, (self.rows, self.samples_in, self.delays)
-        return True
-
-    def due_sync(self, now: float, step: float) -> bool:
-        """Whether ``step`` s have passed since the record was synced."""
-        if now - self._synced < step:
-            return False
-        self._synced = now
         return True
 
     def to_dict(self) -> dict[str, Any]:

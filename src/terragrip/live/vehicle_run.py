@@ -15,7 +15,7 @@ from terragrip.live.inbox import Inbox
 from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
 from terragrip.live.options import has_slips
 from terragrip.live.outbox import Outbox
-from terragrip.live.outputs import Event, Ground, Output, Row
+from terragrip.live.outputs import Event, Output, Refusal, Row
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.prediction import Prediction
@@ -75,6 +75,7 @@ class VehicleRun:
         self.listeners: list[Callable[[Message], None]] = [outbox.put for outbox in outboxes]
         self.statistics = Statistics(self.core, inbox, self.feeds, outboxes, is_real_time)
         self._prediction = Prediction(predict)
+        self._synced = float("-inf")  # when the record was
 
     @property
     def core(self) -> Core:
@@ -110,7 +111,8 @@ class VehicleRun:
                 self._publish([predicted])
         if self.statistics.second(now):
             self.announce()
-        if self.statistics.due_sync(now, _SYNC):
+        if now - self._synced >= _SYNC:
+            self._synced = now
             self._publish(self.pipeline.sync())
 
     def finish(self) -> None:
@@ -132,17 +134,17 @@ class VehicleRun:
                 self.statistics.row(output, self.inbox.clock())
                 self._send(Message(ESTIMATE, output.estimate.time, output, vehicle=self.name))
                 self._advise(output)
-            elif isinstance(output, Ground):
+            elif isinstance(output, Event):
+                self.statistics.event(output)
+                emit(logger, output.kind, **self._logged(output))
+                self._send(Message.of_event(output, self.name))
+            elif not isinstance(output, Refusal):
                 self.statistics.ground = output
                 data = output.to_dict()
                 change = data.pop("change")
                 self._send(Message(SOIL, output.time, data=data, vehicle=self.name))
                 if change is not None:
                     self._send(Message(GROUND, change["time"], data=change, vehicle=self.name))
-            elif isinstance(output, Event):
-                self.statistics.event(output)
-                emit(logger, output.kind, **self._logged(output))
-                self._send(Message.of_event(output, self.name))
 
     def _advise(self, row: Row) -> None:
         """Publish the set-point, where one is wanted and the estimates hold the wheels' slips."""

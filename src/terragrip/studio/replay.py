@@ -1,6 +1,6 @@
 """Frames for the live page: a table of estimates played again, or those of a live service passed on.
 
-Both speak as `terragrip.live.broadcast` does: a hello as JSON, then rows of little-endian doubles (time, predicted, event, columns in
+Both speak as `terragrip.live.links.studio` does: a hello as JSON, then rows of little-endian doubles (time, predicted, event, columns in
 order), here several rows to a message, and JSON texts for everything else.
 """
 

@@ -133,8 +133,10 @@ class FoxgloveSink:
                 self._log(await outbox.get(), outbox)
         finally:
             server.stop()
-            with contextlib.suppress(RuntimeError):  # the file ends as after a kill
+            try:
                 self._close()
+            except RuntimeError as error:  # the file ends as after a kill
+                outbox.lost(f"the end of the MCAP could not be written, is the disk full? ({error})")
 
     def _log(self, message: Message, outbox: Outbox) -> None:
         if self._folder is not None:

@@ -1,54 +1,55 @@
-"""A WebSocket server of our own, which the studio's pages and any script read (terragrip.live.broadcast)."""
+"""A WebSocket server of our own, which the studio's pages and any script read.
+
+First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "wheels", "events"}``; of many vehicles the one asked for by
+``/?vehicle=NAME``, else the first, with its ``name`` and all ``vehicles``. Then JSON texts ``{"kind": "estimate", …}``, ``status``,
+``soil``, ``ground``, ``setpoint``; the ``kind`` of an event is its own. A client that asks for binary gets estimates as little-endian
+doubles: time [s], 1 if predicted, the place of the event in ``events``, then ``columns`` in order.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import http
+import json
+import math
+import struct
 from contextlib import aclosing
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from terragrip.errors import InputError
-from terragrip.live.broadcast import Broadcast
+from terragrip import __version__
+from terragrip.errors import InputError, suggestion
+from terragrip.estimation.columns import wheels_with
+from terragrip.estimation.engine import EVENTS
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
+from terragrip.live.message import ESTIMATE, EVENT, Columns, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri, is_loopback
 from terragrip.prometheus_text import CONTENT_TYPE
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Sequence
+    from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 
-    from terragrip.live.message import Message
+    from terragrip.live.monitor import Answers
     from terragrip.vehicle import Vehicle
 
-
-class Stream(Protocol):
-    """What clients subscribe to (`Broadcast`)."""
-
-    def put(self, message: Message) -> None: ...
-
-    def subscribe(self, request: str) -> AsyncGenerator[str | bytes]: ...
-
-
-class Answers(Protocol):
-    """What reports the service's state (`terragrip.live.monitor.Monitor`)."""
-
-    def answer(self, path: str) -> tuple[int, str] | None: ...
+OPTIONS = ("rate", "columns", "format", "token", "vehicle")
+_LOOK = 0.2  # s between two looks for a first vehicle
 
 
 class StudioSink:
     """``studio://127.0.0.1:8766``. Beyond this machine clients must know the token.
 
-    ``monitor``: what answers plain HTTP requests for the service's state; ``broadcast``: where clients subscribe, of one vehicle unless
-    the service sets another. It sets the monitor too.
+    ``monitor``, which the service sets: what answers plain HTTP requests for its state. ``vehicles``, which a service of many sets: as of
+    `Broadcast`.
     """
 
     def __init__(self, uri: Uri, vehicle: Vehicle | None, columns: Sequence[str]) -> None:
         import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
 
         self.uri = uri
-        self.broadcast: Stream = Broadcast(vehicle.name if vehicle else "", columns)
+        self.broadcast = Broadcast(lambda: {"": (vehicle.name if vehicle else "", columns)})
         self.monitor: Answers | None = None
         self._credentials = Credentials.find()
         if not is_loopback(uri.host) and not self._credentials.token:
@@ -135,3 +136,73 @@ def _is_here(url: str) -> bool:
         return is_loopback(urlsplit(url).hostname or "")
     except ValueError:
         return False
+
+
+class Broadcast:
+    """Messages to any number of clients, each with a queue of its own.
+
+    ``vehicles``: by the name in messages what each vehicle is called and its columns; of one alone its name is empty. ``put`` queues a
+    message for the clients of its vehicle; ``subscribe`` gives one client's frames.
+    """
+
+    def __init__(self, vehicles: Callable[[], Mapping[str, tuple[str, Sequence[str]]]]) -> None:
+        self.vehicles = vehicles
+        self._clients: list[tuple[str, Outbox]] = []
+
+    def __len__(self) -> int:
+        return len(self._clients)
+
+    def put(self, message: Message) -> None:
+        """Queue a message for each client of its vehicle."""
+        for vehicle, client in self._clients:
+            if vehicle == message.vehicle:
+                client.put(message)
+
+    async def _hello(self, uri: Uri, columns: Columns | None) -> tuple[str, dict[str, Any]]:
+        """Of the vehicle that was asked for, once there is one, its name and the first message; raises InputError where there is none."""
+        while not (vehicles := self.vehicles()):
+            await asyncio.sleep(_LOOK)
+        name = uri.options.get("vehicle", next(iter(vehicles)))
+        if name not in vehicles:
+            hint = suggestion(name, vehicles, "look at /health/ready")
+            raise InputError(f"no vehicle {name[:40]!r} sends", hint=hint)
+        vehicle, every = vehicles[name]
+        hello = {
+            "kind": "hello", "version": __version__, "vehicle": vehicle,
+            "columns": [n for n in every if columns is None or columns.wants(n)],
+            "wheels": list(wheels_with("slip", every)), "events": list(EVENTS),
+        }  # fmt: skip
+        return name, {**hello, "name": name, "vehicles": sorted(vehicles)} if name else hello
+
+    async def subscribe(self, request: str = "/") -> AsyncGenerator[str | bytes]:
+        """The frames for a client that asked for ``/?format=binary&rate=20&columns=slip_*``; raises InputError on any other."""
+        uri = Uri.parse(f"studio://127.0.0.1{request}", {"studio": OPTIONS}, "sink")
+        binary = uri.choice("format", ("json", "binary")) == "binary"
+        client = Outbox(uri)
+        name, hello = await self._hello(uri, client.columns)
+        columns = hello["columns"]
+        packer = struct.Struct(f"<{3 + len(columns)}d")
+        self._clients.append((name, client))
+        try:
+            yield json.dumps(hello)
+            while True:
+                message = await client.get()
+                row = message.row
+                if binary and row is not None:
+                    values, places = row.estimate.values, row.estimate.places
+                    event = EVENTS.index(row.estimate.event)
+                    numbers = (values[places[n]] if n in places else math.nan for n in columns)
+                    yield packer.pack(row.estimate.time, row.predicted, event, *numbers)
+                elif message.kind == EVENT:
+                    yield message.json().decode()
+                else:
+                    yield _named(
+                        message.kind, message.json(client.columns if message.kind == ESTIMATE else None)
+                    )
+        finally:
+            self._clients.remove((name, client))
+
+
+def _named(kind: str, data: bytes) -> str:
+    """A JSON object with its kind in front."""
+    return f'{{"kind":"{kind}",{data[1:].decode()}'

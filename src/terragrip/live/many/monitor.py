@@ -8,34 +8,27 @@ from urllib.parse import unquote
 from terragrip.live.many.links import Router
 from terragrip.live.many.memory import held_now
 from terragrip.live.many.vehicles import Vehicles
-from terragrip.live.monitor import LIVE, READY, Family, Monitor, add_sinks
+from terragrip.live.monitor import Answers, Family, Monitor, add_sinks
 from terragrip.live.outbox import Outbox
-from terragrip.prometheus_text import METRICS, Metrics
+from terragrip.prometheus_text import Metrics
 
 
-class ManyMonitor:
-    """Answers by path: those of `Monitor`, and ``/health/ready/NAME`` for one vehicle."""
+class ManyMonitor(Answers):
+    """Of many vehicles, and at ``/health/ready/NAME`` of one."""
 
     def __init__(self, vehicles: Vehicles, routers: Sequence[Router], outboxes: Sequence[Outbox]) -> None:
         self._vehicles, self._routers, self._outboxes = vehicles, routers, outboxes
 
-    def answer(self, path: str) -> tuple[int, str] | None:
-        """HTTP status and text for a path; None where it is none of ours."""
-        if path == LIVE:
-            return 200, "alive\n"
-        if path == READY:
-            return self._ready()
-        if path.startswith(f"{READY}/"):
-            why = self.unready().get(name := unquote(path.removeprefix(f"{READY}/")))
-            if why is None and name not in self._vehicles.runs:
-                return 404, "no such vehicle\n"
-            return (200, "gets data\n") if why is None else (503, f"{why}\n")
-        return (200, self.metrics()) if path == METRICS else None
-
-    def _ready(self) -> tuple[int, str]:
+    def ready(self, path: str) -> tuple[int, str] | None:
         """503 only where no vehicle gets data or a source has no other side: one vehicle's silence is not the service's."""
-        unready, lost = self.unready(), [one for one in self._routers if not one.is_connected]
-        count = len(self._vehicles.runs.keys() | unready.keys())
+        unready, runs = self.unready(), self._vehicles.runs
+        if path:
+            name = unquote(path.removeprefix("/"))
+            if name in unready:
+                return 503, f"{unready[name]}\n"
+            return (200, "gets data\n") if name in runs else (404, "no such vehicle\n")
+        lost = [one for one in self._routers if not one.is_connected]
+        count = len(runs.keys() | unready.keys())
         lines = [f"{one.name}: {one.why_lost}" for one in lost]
         lines.append(f"{count - len(unready)} of {count} vehicles get data")
         lines += [f"{name}: {why}" for name, why in sorted(unready.items())]
@@ -54,7 +47,7 @@ class ManyMonitor:
         return result
 
     def metrics(self) -> str:
-        """Everything counted, as Prometheus reads it (docs/live.md)."""
+        """See `Answers`."""
         page, vehicles = Metrics(), self._vehicles
         unready = self.unready()
         for kind, family, text, value in (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +14,6 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 COLUMNS = ("name", "vehicle", "profile")
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One vehicle, and how its messages are read."""
-
-    vehicle: Vehicle
-    profile: Profile | None
 
 
 class Roster:
@@ -60,16 +51,14 @@ class Roster:
         self._changed = changed
         self._rows = _rows(self._index)
 
-    def of(self, name: str) -> Entry:
+    def of(self, name: str) -> tuple[Vehicle, Profile | None]:
         """The vehicle of a name and its profile; files are read anew where they have changed. Raises InputError where it has none."""
         vehicle, profile = self._rows.get(name, (None, None))
         vehicle, profile = vehicle or self._vehicle, profile or self._profile
         if vehicle is None:
             hint = suggestion(name, self._rows, "add its row, or give --vehicle for all others")
             raise InputError(f"names no vehicle file for {name}", file=self._index, hint=hint)
-        return Entry(
-            self._loaded("vehicle", vehicle), None if profile is None else self._loaded("profile", profile)
-        )
+        return self._loaded("vehicle", vehicle), self._loaded("profile", profile) if profile else None
 
     def _loaded(self, kind: str, path: Path) -> Any:
         """The vehicle or the profile in a file, read once for each change of it."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -13,14 +12,13 @@ from typing import Any, cast
 from terragrip.errors import InputError
 from terragrip.live.counts import FATES
 from terragrip.live.decode import Decoder
+from terragrip.live.inbox import newly_set
 from terragrip.live.links import TopicSource, open_source
 from terragrip.live.links.studio import StudioSink
-from terragrip.live.many.journal import Journal
 from terragrip.live.many.links import Router, check_sources, open_sinks
 from terragrip.live.many.monitor import ManyMonitor
 from terragrip.live.many.roster import Roster
-from terragrip.live.many.stream import ManyStreams
-from terragrip.live.many.vehicles import Limits, Vehicles
+from terragrip.live.many.vehicles import Journal, Limits, Vehicles
 from terragrip.live.message import Message
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
@@ -80,7 +78,7 @@ class ManyService:
         self.monitor = ManyMonitor(self.vehicles, self.routers, self.outboxes)
         for sink in self.sinks:
             if isinstance(sink, StudioSink):
-                sink.monitor, sink.broadcast = self.monitor, ManyStreams(self.vehicles.runs)
+                sink.monitor, sink.broadcast.vehicles = self.monitor, partial(_shown, self.vehicles.runs)
         self._lock = None if record is None else locked(record)
         self._stopping = asyncio.Event()
 
@@ -146,14 +144,8 @@ class ManyService:
         if vehicles.ready:
             await asyncio.sleep(0)
             return
-        vehicles.filled.clear()
         until = min((run.pipeline.waiting_until or 0.0 for run in pending.values()), default=None)
-        if until is None:
-            await vehicles.filled.wait()
-        else:
-            with suppress(TimeoutError):
-                async with asyncio.timeout(max(until - vehicles.clock(), 0.0) + 1e-4):
-                    await vehicles.filled.wait()
+        await newly_set(vehicles.filled, None if until is None else until - vehicles.clock())
         await asyncio.sleep(_TOGETHER)
 
     async def _open(self) -> None:
@@ -202,6 +194,11 @@ class ManyService:
         if lossy:
             lines.append("messages dropped by slow sinks: " + ", ".join(lossy))
         return "\n".join(lines)
+
+
+def _shown(runs: Mapping[str, VehicleRun]) -> dict[str, tuple[str, Sequence[str]]]:
+    """What clients are told of each vehicle: what it is called, and its columns."""
+    return {name: (run.core.vehicle.name or name, run.core.columns) for name, run in runs.items()}
 
 
 def _due(run: VehicleRun, now: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -11,17 +12,18 @@ from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 
-from terragrip.errors import InputError
+from terragrip.errors import reason_of
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.inbox import Inbox, steady_clock
-from terragrip.live.many.journal import Journal
 from terragrip.live.many.memory import held_now, in_words
 from terragrip.live.many.roster import Roster
+from terragrip.live.message import EVENT, Message
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.record import SECONDS, record_thread
 from terragrip.live.topics import VehicleTopics, is_name
 from terragrip.live.vehicle_run import VehicleRun
+from terragrip.log_events import emit
 
 MOST_BYTES = 64 * 1024  # of a message
 CAPACITY = 1024  # samples of a vehicle that may wait for its estimator
@@ -32,6 +34,8 @@ _REMEMBERED = 1000  # vehicles that were refused
 _REPORT_EVERY = 5.0  # s between two events about names that are none
 _THREADS = 4  # for records
 _LENGTHS = 61  # of segments, from half the usual one to one and a half
+
+logger = logging.getLogger("terragrip.live")
 
 Waiting = tuple[int, bytes, float, str]
 """Source, message, arrival, topic."""
@@ -47,11 +51,26 @@ class Limits:
 
 @dataclass(slots=True)
 class Refusal:
-    """Why a vehicle is not estimated, until when [s, monotonic], and its messages since."""
+    """Why a vehicle is not estimated, and until when [s, monotonic]."""
 
     why: str
     until: float
-    messages: int = 0
+
+
+class Journal:
+    """Logs each event and gives it to every listener, none of which is a sink: a sink's topics belong to vehicles."""
+
+    def __init__(self, listeners: list[Callable[[Message], None]]) -> None:
+        self.listeners = listeners
+
+    def event(self, kind: str, source: str, text: str, vehicle: str = "") -> None:
+        """An event of ``source``: a link's URI, or ``service``."""
+        emit(logger, kind, source=source, text=text, **({"vehicle": vehicle} if vehicle else {}))
+        message = Message(
+            EVENT, float("nan"), data={"kind": kind, "source": source, "text": text}, vehicle=vehicle
+        )
+        for listener in self.listeners:
+            listener(message)
 
 
 class Vehicles:
@@ -115,7 +134,7 @@ class Vehicles:
         self.ready.pop(run.name, None)
         self.failures += 1
         run.pipeline.abandon()
-        self.refuse(run.name, _in_words(error), "vehicle_failed")
+        self.refuse(run.name, reason_of(error), "vehicle_failed")
 
     def refuse(self, name: str, why: str, kind: str = "vehicle_refused") -> None:
         if len(self.refusals) >= _REMEMBERED:
@@ -129,7 +148,6 @@ class Vehicles:
         if waiting is None:
             refusal = self.refusals.get(name)
             if refusal is not None:
-                refusal.messages += 1
                 if time.monotonic() < refusal.until:
                     return
             elif not is_name(name):
@@ -172,7 +190,7 @@ class Vehicles:
             run = self._opened(name)
         except Exception as error:  # noqa: BLE001 - as in `guarded`
             del self._waiting[name]
-            self.refuse(name, _in_words(error))
+            self.refuse(name, reason_of(error))
             return True
         self.refusals.pop(name, None)
         self.runs[name] = self.ready[name] = run
@@ -190,18 +208,14 @@ class Vehicles:
 
     def _opened(self, name: str) -> VehicleRun:
         self.roster.refresh()
-        entry = self.roster.of(name)
-        if entry.profile is not None:
-            check_channels(entry.profile, entry.vehicle, self._options.window)
-        decoders = [Decoder(entry.profile) for _ in self._topics]
-        channels = [
-            channel for decoder in decoders for channel in self._options.promised(decoder, entry.vehicle)
-        ]
-        core, setpoint = self._options.core(
-            entry.vehicle, [one.named(name) for one in self._topics], channels
-        )
+        vehicle, profile = self.roster.of(name)
+        if profile is not None:
+            check_channels(profile, vehicle, self._options.window)
+        decoders = [Decoder(profile) for _ in self._topics]
+        channels = [channel for decoder in decoders for channel in self._options.promised(decoder, vehicle)]
+        core, setpoint = self._options.core(vehicle, [one.named(name) for one in self._topics], channels)
         run = VehicleRun(
-            core, Inbox(CAPACITY, self.clock), decoders, (), profile=entry.profile, name=name, setpoint=setpoint,
+            core, Inbox(CAPACITY, self.clock), decoders, (), profile=profile, name=name, setpoint=setpoint,
             record=None if self._record is None else self._record / name, thread=next(self._threads), segment=next(self._segments),
             predict=PREDICT,
         )  # fmt: skip
@@ -232,13 +246,3 @@ def _feed(run: VehicleRun, source: int, data: bytes, arrival: float | None, topi
         feed.dropped(1)  # before it is decoded: a vehicle that sends too much costs no other more than that
     else:
         feed.message(data, arrival, topic=topic)
-
-
-def _in_words(error: Exception) -> str:
-    if isinstance(error, InputError):
-        return str(error)
-    if isinstance(error, MemoryError):
-        return "not enough memory"
-    if isinstance(error, OSError):
-        return f"a file cannot be read or written ({error})"
-    return " ".join(f"a defect of Terragrip ({type(error).__name__}: {error})".split())
