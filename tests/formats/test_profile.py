@@ -462,6 +462,19 @@ def test_a_pattern_without_a_column_names_the_channel_and_not_what_it_leaves_out
     assert "/odom" not in str(refused.value)
 
 
+@pytest.mark.parametrize("command", ["/cmd_vel.twist.linear.x", "/Target_vel.twist.linear.x"])
+def test_any_text_of_a_pattern_is_no_command(foreign: pd.DataFrame, command: str) -> None:
+    """ROS 2 stamps /cmd_vel since Jazzy: ros2-4wd took it for the ground speed, before /gps/vel, and slip was what the driver asked for."""
+    log = foreign.rename(columns={"kmh": command}).assign(**{"/gps/vel.twist.linear.x": 7.0})
+    for pattern, expected in (
+        ("*vel.twist.linear.x", np.full(len(log), 7.0)),
+        (f"*{command[1:7]}*.x", log[command]),
+    ):
+        channels = {"ground_speed": pattern, "wheel_speed_rl": "rpm_left"}
+        profile = Profile.from_dict({"time": {"from": "stamp"}, "channels": channels})
+        np.testing.assert_array_equal(profile.apply(log)["ground_speed"], expected)
+
+
 def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None:
     profile = Profile.from_dict({"channels": {"ground_speed": {"from": "kmh", "unit": "km/h"}}})
     with pytest.raises(

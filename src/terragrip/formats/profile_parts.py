@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
@@ -153,6 +154,9 @@ class TimeSource(Part):
         return value
 
 
+_COMMANDED = re.compile(r"(?<![a-z])(cmd|command(s|ed)?|set_?point|desired|target)(?![a-z])", re.IGNORECASE)
+
+
 class Rows(Part):
     """The rows to keep: those whose ``column`` equals a value."""
 
@@ -166,11 +170,15 @@ def as_pattern(name: str) -> str:
 
 
 def matching(name: str, names: Iterable[str]) -> list[str]:
-    """The names that a profile's name stands for: itself, or all that its ``*`` allows."""
+    """The names that a profile's name stands for: itself, or all that its ``*`` allows.
+
+    ``*`` stands for nothing that was commanded (``/cmd_vel``, ``/joint_commands``): the profile says that word, or it was not meant.
+    """
     if "*" not in name:
         return [name] if name in names else []
     pattern = as_pattern(name)
-    return [result for result in names if fnmatch.fnmatchcase(result, pattern)]
+    found = [result for result in names if fnmatch.fnmatchcase(result, pattern)]
+    return found if _COMMANDED.search(name) else [result for result in found if not _COMMANDED.search(result)]
 
 
 def unit_factor(unit: str, target: str) -> float:
