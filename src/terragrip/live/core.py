@@ -262,7 +262,7 @@ class Core:
             speed = torques[0].replace("drive_torque", "wheel_speed")
             text += f"; for slip alone give a profile of the speeds, without torques: 'channels: {{{speed}: {speed}, ...}}'"
         elif torques:
-            text += "; name it in the profile, or write 'driven: false' for its axle in the vehicle file"
+            text += "; name it in the profile, or write 'driven: false' in the vehicle file if its axle has no drive"
         return [Event(time, "schema", "estimator", text)]
 
     def _watch(self, estimate: Estimate, out: list[Output]) -> None:

@@ -96,7 +96,9 @@ class _Shift:
             channels[name] = np.full(len(block), np.nan)
             channels[name][rows] = self._at(block.time[rows] + self.lag.of_the_clock, time, values)
         noise = {**self.noise, **block.noise}
-        return replace(block, channels=channels, noise=noise).with_notes(_sentence(self.lag))
+        return replace(block, channels=channels, noise=noise, delay=self.lag.delay_left).with_notes(
+            _sentence(self.lag)
+        )
 
     def _at(self, when: Floats, time: Floats, values: Floats) -> Floats:
         """A channel (n,) of instants ``time`` at others; NaN outside, and in gaps."""

@@ -40,6 +40,7 @@ STIFFNESS = (
 )
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
 _USUAL = 0.1  # s, prior SD of a receiver's delay, before a log shows it (ours): receivers filter
+_FILTERED = 0.2  # of a lag that was corrected: a filter of first order errs by 1/e of its lag where a change begins, a mere delay does not
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,21 @@ class Lag:
         """SD [s] of the sensor's own delay: what was found, a vehicle's own lag being anywhere within the explained one, and
         what is usual.
         """
+        weight, variance = self._beside_usual
+        return float(np.hypot(weight * self.of_the_clock, np.sqrt(weight * variance)))
+
+    @property
+    def delay_left(self) -> float:
+        """SD [s] of the sensor's delay once `of_the_clock` is corrected: what is not known of it, and that a filter is no mere delay."""
+        weight, variance = self._beside_usual
+        return float(np.hypot(_FILTERED * self.of_the_clock, np.sqrt(weight * variance)))
+
+    @property
+    def _beside_usual(self) -> tuple[float, float]:
+        """Weight of what was found beside what is usual, and its variance [s²]."""
         least, most = self.explained
         variance = self.std**2 + (most - least) ** 2 / 12
-        weight = _USUAL**2 / (_USUAL**2 + variance)
-        return float(np.hypot(weight * self.of_the_clock, np.sqrt(weight * variance)))
+        return _USUAL**2 / (_USUAL**2 + variance), variance
 
     @property
     def why_not(self) -> str:

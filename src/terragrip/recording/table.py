@@ -219,7 +219,7 @@ class Recording:
                 page = "vehicle#signals-that-are-missing"
                 raise self._unfit(f"wheel_speed_{wheel}", "is missing", f"{evidence}; {fix}", page)
             if driven and f"drive_torque_{wheel}" not in self.channels:
-                hint = "add it, or say 'driven: false' for its axle in the vehicle file"
+                hint = "add it, or say 'driven: false' in the vehicle file if its axle has no drive"
                 problem = f"is missing, but the wheel {wheel} is driven"
                 raise self._unfit(f"drive_torque_{wheel}", problem, hint, "vehicle#signals-that-are-missing")
         checks.require_hitch_height(vehicle, self.channels, self.source)
