@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -286,6 +287,31 @@ def test_a_broken_file_is_refused_with_one_line_and_a_good_one_estimated(
     page.click("button:text-is('Estimate')")
     page.wait_for_selector(".state.done")
     assert (folder / "by-hand.parquet").exists()
+
+
+def test_an_upload_that_ends_or_is_cut_on_another_page_says_so_there(page: Any, served: Served) -> None:
+    """Whoever went on to the fit page was thrown from it to the log; a cut one said only that the studio did not respond."""
+    page.goto(served.url)
+    page.wait_for_selector("text=recording.parquet")
+    held: list[Any] = []
+    uploads = re.compile(r"/api/file\?path=day")
+    page.route(uploads, lambda route: held.append(route))
+    for name in ("day1.csv", "day2.csv"):
+        page.set_input_files(
+            "#new-file", files=[{"name": name, "mimeType": "", "buffer": b"time,v\n0,1\n1,1\n"}]
+        )
+        page.wait_for_selector(f"#uploads:has-text('{name}')")
+    while len(held) < 2:
+        page.wait_for_timeout(20)
+    page.click("nav >> text=Fit")
+    page.wait_for_selector("#slider-a")
+    held[0].continue_()
+    page.wait_for_selector(".note:has-text('day1.csv is in the folder')")
+    served.stop()
+    held[1].continue_()
+    page.wait_for_selector(".note.error:has-text('day2.csv: was not uploaded')")
+    assert "#/fit" in page.url
+    page.unroute(uploads)
 
 
 def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, folder: Path) -> None:

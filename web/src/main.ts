@@ -1,8 +1,8 @@
-import { Notices } from "./ui/api";
+import { Notices, SILENT } from "./ui/api";
 import { foldChoosers } from "./ui/choosers";
 import { fill, h } from "./ui/dom";
 import { keepFocus } from "./ui/focus";
-import { leaveNotes } from "./ui/notes";
+import { SHOWN, withdraw } from "./ui/notes";
 import { startTheme, switchTheme } from "./ui/theme";
 import { startUnits, unitsChooser } from "./ui/units";
 import type { Page } from "./ui/page";
@@ -40,7 +40,7 @@ async function open(): Promise<void> {
   if (turn !== opened) return;
   unloaded = page === missing;
   leave?.();
-  leaveNotes();
+  withdraw(undefined, SHOWN);
   main.className = `page-${unloaded ? "start" : name}`;
   fill(main);
   leave = page(main, { notices, query });
@@ -72,6 +72,7 @@ notices.on((notice) => {
   if (notice.kind !== "connection") return;
   const state = document.getElementById("connection");
   if (state) state.textContent = notice.up ? "" : "The studio does not respond; trying again …";
+  if (notice.up) withdraw(SILENT, SHOWN);
   if (notice.up && unloaded) void open();
 });
 

@@ -84,6 +84,7 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
     line.remove();
     if (!taken) return;
     note(`${taken.path} is in the folder`);
+    if (!drop.isConnected) return; // the user went on to another page meanwhile
     if (taken.kind === "recording" && alone) location.hash = pageOf(taken.path);
     else await reload();
   }

@@ -1,5 +1,8 @@
 /** The server's interface. Every failure becomes an Error whose message is the server's one line. */
 
+/** The error of a request that nobody answers; withdrawn some seconds after the studio responds again. */
+export const SILENT = "The studio does not respond; is it still running?";
+
 export interface Item {
   path: string;
   kind: string;
@@ -50,7 +53,7 @@ export async function request(path: string, query: Query = {}, options: RequestI
     answer = await fetch(more ? `${plain}${plain.includes("?") ? "&" : "?"}${more}` : plain, options);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new Error("The studio does not respond; is it still running?");
+    throw new Error(SILENT);
   }
   if (!answer.ok) throw new Error(await reason(answer));
   return answer;
@@ -81,7 +84,7 @@ export function upload(path: string, content: Blob, replace: boolean, progress: 
     const call = new XMLHttpRequest();
     call.open("PUT", address("file", { path, replace }));
     call.upload.onprogress = (event) => event.lengthComputable && progress(event.loaded / event.total);
-    call.onerror = () => reject(new Error("The studio does not respond; is it still running?"));
+    call.onerror = () => reject(new Error(`${path}: was not uploaded, since the studio stopped to respond; upload it again`));
     call.onload = () => {
       let said: { detail?: string } = {};
       try {

@@ -1,12 +1,12 @@
 import { h } from "./dom";
 
-const SHOWN = 6000; // ms
+export const SHOWN = 6000; // ms
 
 /** One line at the foot of the page; an error stays until it is dismissed, or its page is left. The same line is not shown twice. */
 export function note(text: string, kind: "info" | "error" = "info"): void {
   const box = document.getElementById("notes");
   if (!box) return;
-  for (const old of box.querySelectorAll(`.note.${kind}`)) if (old.firstElementChild?.textContent === text) old.remove();
+  withdraw(text);
   const line = h("div", { class: `note ${kind}`, role: kind === "error" ? "alert" : null }, h("span", {}, text));
   line.append(h("button", { type: "button", "aria-label": "Dismiss", click: () => line.remove() }, "×"));
   box.append(line);
@@ -14,9 +14,13 @@ export function note(text: string, kind: "info" | "error" = "info"): void {
   if (kind === "info") setTimeout(() => line.remove(), SHOWN);
 }
 
-/** Another page was opened: errors of the one before leave after as long as an info is shown. */
-export function leaveNotes(): void {
-  for (const line of document.querySelectorAll("#notes > .note")) setTimeout(() => line.remove(), SHOWN);
+/** Remove the lines with a text, or after a while all: what is no longer so, and errors of a page that was left. */
+export function withdraw(text?: string, after = 0): void {
+  for (const line of document.querySelectorAll("#notes > .note")) {
+    if (text !== undefined && line.firstElementChild?.textContent !== text) continue;
+    if (after) setTimeout(() => line.remove(), after);
+    else line.remove();
+  }
 }
 
 /** Run something and show its failure as a note; undefined where it failed. */
