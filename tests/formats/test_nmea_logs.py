@@ -60,6 +60,23 @@ def test_nmea_sentences(tmp_path: Path) -> None:
     assert table.start == pytest.approx(1795305570.0)  # 2026-11-21 23:59:30 UTC
 
 
+def test_speeds_without_a_time_are_counted(tmp_path: Path) -> None:
+    """Of a receiver that sends VTG at 10 Hz and RMC at 1 Hz nine speeds of ten were left out, and nothing said so."""
+    place = ("A", "5103.0000", "N", "01344.0000", "E", "2.0", "90.0", "211126", "", "")
+    vtg = str(pynmea2.VTG("GP", "VTG", ("90.0", "T", "", "M", "2.0", "N", "3.7", "K", "A")))
+    for often, expected in ((1, ()), (10, ("90 VTG sentences came between two times and were left out",))):
+        lines = [
+            line
+            for k in range(10)
+            for line in (str(pynmea2.RMC("GP", "RMC", (f"1200{k:02d}.00", *place))), *[vtg] * often)
+        ]
+        path = tmp_path / "gnss.nmea"
+        path.write_text("\n".join(lines) + "\n")
+        table = read_table(path)
+        assert len(table.columns["ground_speed"]) == 10
+        assert [note.partition(":")[0] for note in table.notes] == list(expected)
+
+
 def test_nmea_runs_past_midnight(tmp_path: Path) -> None:
     clocks = ("235959.50", "000000.00", "000000.50")
     gga = ("5103.0000", "N", "01344.0000", "E", "4", "12", "0.8", "110.5", "M", "44.0", "M", "", "")

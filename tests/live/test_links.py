@@ -368,6 +368,17 @@ async def test_a_receiver_on_a_serial_line(vehicle, port):
     assert rows[0].values["latitude"] == pytest.approx(48 + 7.038 / 60)
 
 
+async def test_a_receiver_sends_its_speed_more_often_than_its_place(vehicle, sender, port):
+    """Of VTG at 10 Hz beside RMC at 1 Hz, all but RMC's was left out as its repetition."""
+    service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
+    async with running(service):
+        rmc = sentence("GPRMC,123500,A,4807.038,N,01131.000,E,002.0,084.4,230394,003.1,W")
+        vtg = sentence("GPVTG,084.4,T,,M,002.0,N,003.7,K")
+        for burst in (rmc + vtg, vtg, vtg, rmc + vtg):
+            sender.send(burst, {"wheel_speed_fl": 3.0})
+        await until(lambda: service.core.counts.by_channel.get("ground_speed", {}).get("received") == 4)
+
+
 async def test_a_receiver_that_sends_datagrams_beside_one_that_sends_json(vehicle, sender, port):
     service = Service(vehicle, [f"udp://127.0.0.1:{port}"])
     async with running(service):

@@ -28,13 +28,18 @@ _DAY = 86400.0
 
 @dataclass
 class _Track:
-    """Values by name with their stamps; ``now`` is the last stamp [s], ``day`` that of the last date [s since 1970]."""
+    """Values by name with their stamps; ``now`` is the last stamp [s], ``day`` that of the last date [s since 1970].
+
+    ``untimed`` counts speeds after the first one (VTG has no time) at a stamp, ``vtg``.
+    """
 
     columns: dict[str, tuple[array[float], array[float]]] = field(default_factory=dict)
     now: float | None = None
     day: float | None = None
     bad: int = 0
     no_fix: int = 0
+    untimed: int = 0
+    vtg: float | None = None
 
     def add(self, name: str, value: float) -> None:
         """Keep a value at the present stamp."""
@@ -82,6 +87,12 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
         notes.append(f"{track.bad} sentences are damaged and were left out.")
     if track.no_fix:
         notes.append(f"{track.no_fix} sentences have no fix: their values are missing.")
+    speeds = track.columns.get("ground_speed")
+    if speeds is not None and track.untimed > len(speeds[0]):
+        notes.append(
+            f"{track.untimed} VTG sentences came between two times and were left out: they have no time of their own. "
+            "Let the receiver send RMC or GGA as often."
+        )
     signals = {
         name: Signal(np.array(stamps), np.array(values), UNITS[name])
         for name, (stamps, values) in track.columns.items()
@@ -94,8 +105,11 @@ def _add(sentence: Sentence, track: _Track) -> None:
     track.set_time(sentence.clock, sentence.date)
     track.no_fix += not sentence.has_fix
     speeds = track.columns.get("ground_speed")
-    if sentence.kind == "VTG" and speeds is not None and speeds[0][-1] == track.now:
-        return  # RMC has given speed and course of this instant
+    if sentence.kind == "VTG":
+        track.untimed += track.now is not None and track.vtg == track.now
+        track.vtg = track.now
+        if speeds is not None and speeds[0][-1] == track.now:
+            return  # RMC has given speed and course of this instant
     for name, value in sentence.fields.items():
         track.add(name, value)
 

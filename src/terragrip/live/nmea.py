@@ -20,7 +20,7 @@ class Sentences:
     """Feeds sentences, each as it comes, and says what is none."""
 
     def __init__(self, feed: Feed) -> None:
-        self._feed, self._has_rmc = feed, False
+        self._feed, self._has_said = feed, False
 
     def line(self, line: bytes) -> None:
         """A line, whatever a logger wrote before its sentences; raises InputError where pynmea2 is not installed."""
@@ -30,9 +30,10 @@ class Sentences:
         if damaged or (line and not _FRAME.search(line)):
             feed.reject(f"not a whole NMEA sentence: {line[:30].decode('ascii', 'replace')!r}")
         for sentence in good:
-            if sentence.kind == "VTG" and self._has_rmc:
-                continue  # it repeats the speed of RMC
-            self._has_rmc |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
+            if sentence.kind == "VTG" and self._has_said:
+                self._has_said = False  # it repeats the speed of the RMC before it; more of them are new
+                continue
+            self._has_said |= sentence.kind == "RMC" and "ground_speed" in sentence.fields
             feed.excuse("" if sentence.has_fix else "its sentences have no fix")
             if sentence.fields:
                 feed.fields(sentence.fields)
