@@ -15,7 +15,6 @@ from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.payload import unpacker
-from terragrip.live.pulse import Pulse
 from terragrip.live.service import Service
 from terragrip.live.statistics import Statistics
 
@@ -161,37 +160,36 @@ async def test_metrics_are_what_went_in_and_what_came_out(tmp_path, vehicle, sho
     )
 
 
-def pulse() -> tuple[Pulse, Feed]:
+def source() -> Feed:
     profile = Profile.from_dict({"time": {"from": "t"}, "channels": {"ground_speed": "v"}})
-    feed = Feed(0, "serial:x", Decoder(profile), unpacker(None), Inbox(), after=float("-inf"))
-    return Pulse(feed, 0.0), feed
+    return Feed(0, "serial:x", Decoder(profile), unpacker(None), Inbox(), after=float("-inf"))
 
 
 async def test_the_period_of_a_source_is_its_own_and_no_silence_becomes_it():
-    one, feed = pulse()
+    feed = source()
     for now in (1.0, 2.1, 3.0, 4.0, 5.1, 6.0):
         feed.sample(now, {"ground_speed": 1.0})
-        assert one.silence(now) == 0.0  # there is a message, though nobody has looked yet
-        assert one.update(now)
-    assert one.period == pytest.approx(1.0, abs=0.11)
+        assert feed.silence(now) == 0.0  # there is a message, though nobody has looked yet
+        feed.watch(now, 0.01)
+    assert feed.period == pytest.approx(1.0, abs=0.11)
     feed.sample(66.0, {"ground_speed": 1.0})
-    assert one.update(66.0)
-    assert one.period == pytest.approx(1.0, abs=0.11)
-    assert one.silence(67.5) == 1.5
+    feed.watch(66.0, 0.01)
+    assert feed.period == pytest.approx(1.0, abs=0.11)
+    assert feed.silence(67.5) == 1.5
 
 
 async def test_a_receiver_without_a_fix_that_falls_silent_has_no_excuse_any_more():
     """The page of its health said "its sentences have no fix" long after its cable was cut."""
-    one, feed = pulse()
+    feed = source()
     now = 100.0
     feed.inbox.clock = lambda: now
     feed.sample(now, {"ground_speed": 1.0})
-    assert one.update(now)
+    feed.watch(now, 0.01)
     now = 110.0
     feed.excuse("its sentences have no fix")
     assert feed.excuse_at(110.5) == "its sentences have no fix"
-    assert (one.why_old(110.5) or "").endswith(": its sentences have no fix")
-    assert one.why_old(130.0) == "nothing came from serial:x for 30.0 s"
+    assert (feed.why_old(110.5) or "").endswith(": its sentences have no fix")
+    assert feed.why_old(130.0) == "nothing came from serial:x for 30.0 s"
 
 
 async def test_a_slow_source_beside_a_fast_one_is_not_lost_between_its_messages(vehicle, short, port, sender):

@@ -32,25 +32,20 @@ def compared(notes: Sequence[Note]) -> list[Note]:
     first: dict[str, str] = {}
     result = []
     for note in notes:
-        content, summary = note.get("content"), note["summary"]  # earlier calls kept no content
+        content, summary = note.get("content"), dict(note["summary"])  # earlier calls kept no content
         copied = bool(content) and first.setdefault(str(content), note["log"]) != note["log"]
         why = f"a copy of {first[str(content)]}" if copied else impossible(summary)
-        note = {**note, "summary": {**summary, "left_out": why}}
+        summary["left_out"] = why
+        note = {**note, "summary": summary}
         if why:
-            none = dict.fromkeys(MEANS)
-            note |= {"sample": False, "soils": [], "summary": {**note["summary"], **none}}
+            summary.update(dict.fromkeys(MEANS))
+            note |= {"sample": False, "soils": []}
         result.append(note)
     said = _overlaps(result)
-    return [
-        {
-            **note,
-            "summary": {
-                **note["summary"],
-                "notes": " ".join(filter(None, (note["summary"]["notes"], said.get(note["log"])))),
-            },
-        }
-        for note in result
-    ]
+    for note in result:
+        if note["log"] in said:
+            note["summary"]["notes"] = f"{note['summary']['notes']} {said[note['log']]}".lstrip()
+    return result
 
 
 def _overlaps(notes: Sequence[Note]) -> dict[str, str]:

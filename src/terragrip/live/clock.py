@@ -163,11 +163,10 @@ class SourceClock:
 
     def state(self) -> dict[str, Any]:
         """As JSON holds it."""
-        return {**{name: getattr(self, name) for name in self.__slots__}, "drift": asdict(self.drift)}
+        return asdict(self)
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> SourceClock:
         """The inverse of `state`."""
-        result = cls(**{**state, "drift": Drift(**state["drift"])})
-        result.waiting = [(a, s, v) for a, s, v in state["waiting"]]
-        return result
+        waiting = [(arrival, stamp, values) for arrival, stamp, values in state["waiting"]]
+        return cls(**{**state, "waiting": waiting, "drift": Drift(**state["drift"])})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -13,6 +14,10 @@ from terragrip.live.payload import Unpack, Unreadable
 _EVERY = 5.0  # s between two events of the same kind about the same thing
 _SETTLED = 50  # messages after which another set of fields is a change, not one more kind of message
 _LAYOUTS = 64
+FLOOR = 0.5  # s of silence; the pages' floor too (web/src/live/feed.ts)
+_GAPS = 5
+_SILENT = 1.0  # s, or ten periods of rows
+_UNKNOWN = 3.0  # s, before a second message has shown the period
 
 
 class Lost(Exception):
@@ -41,7 +46,10 @@ class Feed:
         self.decoder, self.inbox = decoder, inbox
         self.after = after  # newest stamp that the record holds: a replay goes on behind it
         self.messages = self.unreadable = 0
-        self.is_lost = False
+        self.is_lost = self.is_silent = False
+        self.arrival = inbox.clock()  # when `watch` last saw a new message
+        self._seen = 0  # messages that it has seen
+        self._gaps: deque[float] = deque(maxlen=_GAPS)  # s between them
         self._excuse, self._excuse_time = "", float("-inf")  # why nothing comes although the other side sends
         self.one_layout = True  # messages are of few kinds, so that another one is worth an event
         self._unpack = unpack
@@ -133,6 +141,44 @@ class Feed:
     def excuse_at(self, now: float) -> str:
         """Why nothing comes although the other side sends; empty where it does not."""
         return self._excuse if now - self._excuse_time < _EVERY else ""
+
+    def watch(self, now: float, rows: float) -> None:
+        """Report that the source fell silent, or sends again; looks at it now and then. ``rows`` [s]: their period."""
+        silence = self.silence(now)
+        if new := self._come - self._seen:
+            if self._seen:
+                self._gaps.append((now - self.arrival) / new)
+            self._seen, self.arrival = self._come, now
+            if self.is_silent:
+                self.is_silent = False
+                self.connected("it sends again")
+            return
+        longest = max(_SILENT if self.period else _UNKNOWN, 10.0 * rows, 2.0 * self.period)
+        if silence > longest and not (self.is_lost or self.is_silent):
+            self.is_silent = True
+            self.lost(f"{self.excuse_at(now) or 'nothing came'} for {silence:.1f} s")
+
+    @property
+    def _come(self) -> int:
+        return self.messages + self.unreadable
+
+    @property
+    def period(self) -> float:
+        """Usual time between two messages [s], 0 before the second: the median of the last gaps, so that one long silence counts little."""
+        return sorted(self._gaps)[len(self._gaps) // 2] if self._gaps else 0.0
+
+    def silence(self, now: float) -> float:
+        """s since the last message, or since the start where none came."""
+        return now - self.arrival if self._come == self._seen else 0.0
+
+    def why_old(self, now: float) -> str | None:
+        """What is said where nothing came for twice the period, and `FLOOR`; None where something did."""
+        silence, excuse = self.silence(now), self.excuse_at(now)
+        why = f": {excuse}" if excuse else ""
+        if not self._come:
+            return f"nothing has come from {self.name} yet{why}"
+        old = silence > max(FLOOR, 2.0 * self.period)
+        return f"nothing came from {self.name} for {silence:.1f} s{why}" if old else None
 
     def connected(self, how: str = "connected again") -> None:
         """The source has its other side (again)."""

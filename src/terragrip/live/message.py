@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
 
-from terragrip.live.outputs import Event, Row
+from terragrip.live.outputs import Row
 
 ESTIMATE, EVENT, STATUS, SOIL, GROUND, SETPOINT = "estimate", "event", "status", "soil", "ground", "setpoint"
 
@@ -30,11 +30,6 @@ class Message:
     data: dict[str, Any] | None = None
     vehicle: str = ""
     _json: dict[Columns | None, bytes] = field(default_factory=dict)
-
-    @classmethod
-    def of_event(cls, event: Event, vehicle: str = "") -> Message:
-        """An event's message."""
-        return cls(EVENT, event.time, data=event.to_dict(), vehicle=vehicle)
 
     def json(self, columns: Columns | None = None) -> bytes:
         """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
 from terragrip.live.counts import FATES
+from terragrip.live.feed import FLOOR
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
 from terragrip.live.pipeline import Pipeline
-from terragrip.live.pulse import FLOOR
 from terragrip.live.statistics import Statistics
 from terragrip.prometheus_text import METRICS, Labels, Metrics
 
@@ -94,7 +94,7 @@ class Monitor(Answers):
             yield counter("recorded_rows", "Rows given to the record.", recorder.rows_kept)
         now, text = s.now(), "Since a source's last message."
         silences: list[tuple[Labels, float]] = [
-            ({"source": f"{k} {pulse.feed.name}"}, pulse.silence(now)) for k, pulse in enumerate(s.pulses)
+            ({"source": f"{k} {feed.name}"}, feed.silence(now)) for k, feed in enumerate(s.feeds)
         ]
         yield "gauge", "terragrip_live_source_silence_seconds", text, silences
 
@@ -107,8 +107,8 @@ class Monitor(Answers):
         statistics = self._statistics
         now = statistics.now()
         if statistics.is_real_time:
-            for pulse in statistics.pulses:
-                why = pulse.why_old(now)
+            for feed in statistics.feeds:
+                why = feed.why_old(now)
                 if why is not None:
                     return why
         if not statistics.rows:
@@ -116,7 +116,7 @@ class Monitor(Answers):
         if not statistics.is_real_time:
             return None
         age = now - statistics.last_row
-        periods = (statistics.period, *(pulse.period for pulse in statistics.pulses))
+        periods = (statistics.period, *(feed.period for feed in statistics.feeds))
         if age > max(FLOOR, 2.0 * max(periods)) + statistics.window:
             return f"messages come, but no row was estimated for {age:.1f} s"
         return None

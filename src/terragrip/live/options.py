@@ -60,24 +60,20 @@ class Options(Settings):
         settings = Settings(**{**given, **known, "ground": self.ground or self.library is not None})
         core = Core(vehicle, settings, self.library)
         setpoint = None if self.setpoint is None else LiveSetpoint(vehicle, *self.setpoint)
-        if core.estimator is not None:
-            _refuse_without_slips(core.estimator, settings.ground, setpoint is not None)
+        estimator = core.estimator
+        if estimator is not None and settings.ground and estimator.rims:
+            raise InputError(
+                "changes of the ground are found in adhesion and soil resistance, which need drive torques",
+                place="--ground", hint="leave it out: the sources give speeds alone",
+            )  # fmt: skip
+        if estimator is not None and setpoint is not None and not has_slips(estimator):
+            raise InputError(
+                "a set-point of slip needs the slip of each driven wheel",
+                place="--setpoint", hint="leave it out: the sources give the drive train's speed alone",
+            )  # fmt: skip
         return core, setpoint
 
 
 def has_slips(estimator: TractionEstimator) -> bool:
     """Whether its estimates hold the slip of each wheel, and what shows whether they can be trusted."""
     return not estimator.rims and not isinstance(estimator, EngineEstimator)
-
-
-def _refuse_without_slips(estimator: TractionEstimator, ground: bool, setpoint: bool) -> None:
-    if ground and estimator.rims:
-        raise InputError(
-            "changes of the ground are found in adhesion and soil resistance, which need drive torques",
-            place="--ground", hint="leave it out: the sources give speeds alone",
-        )  # fmt: skip
-    if setpoint and not has_slips(estimator):
-        raise InputError(
-            "a set-point of slip needs the slip of each driven wheel",
-            place="--setpoint", hint="leave it out: the sources give the drive train's speed alone",
-        )  # fmt: skip

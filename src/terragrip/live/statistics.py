@@ -11,14 +11,11 @@ from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
 from terragrip.live.outbox import Outbox
 from terragrip.live.outputs import Event, Row
-from terragrip.live.pulse import Pulse
 
 if TYPE_CHECKING:
     from terragrip.ground.live import GroundState
 
 _BEHIND = 1.0  # s
-_SILENT = 1.0  # s, or ten periods
-_UNKNOWN = 3.0  # s, before a second message has shown the period
 _EVERY = 5.0  # s between two events that estimates are behind
 _TURNING = ("wheel_speed_", "wheel_based_speed", "engine_speed")
 
@@ -39,7 +36,7 @@ class Statistics:
         self.ground: GroundState | None = None
         self.events: deque[Event] = deque(maxlen=50)
         self.event_counts: dict[str, int] = {}
-        self.pulses = [Pulse(feed, now) for feed in feeds]
+        self.feeds = feeds
         # Of this run, measured rows alone; a record's rows of earlier runs are in `Core.rows`.
         self.rows = self.samples_in = self.predicted_rows = self.filter_restarts = 0
         self.delays = 0.0  # s, the sum over `rows`
@@ -91,8 +88,8 @@ class Statistics:
 
     def watch(self, now: float) -> None:
         """Report sources that fall silent or send again, and estimates that are behind."""
-        for pulse in self.pulses:
-            self._watch_silence(pulse, now)
+        for feed in self.feeds:
+            feed.watch(now, self.period)
         samples = self._inbox.samples
         lag = now - samples[0][0] if samples else 0.0
         dropped, self._dropped = self._inbox.values_dropped - self._dropped, self._inbox.values_dropped
@@ -100,18 +97,6 @@ class Statistics:
             self._behind = now
             text = f"estimates are {lag:.2g} s behind; {dropped} values dropped just now"
             self._inbox.event("behind", "service", text)
-
-    def _watch_silence(self, pulse: Pulse, now: float) -> None:
-        feed = pulse.feed
-        if pulse.update(now):
-            if pulse.is_silent:
-                pulse.is_silent = False
-                feed.connected("it sends again")
-        elif not feed.is_lost and not pulse.is_silent:
-            silence = pulse.silence(now)
-            if silence > max(_SILENT if pulse.period else _UNKNOWN, 10.0 * self.period, 2.0 * pulse.period):
-                pulse.is_silent = True
-                feed.lost(f"{feed.excuse_at(now) or 'nothing came'} for {silence:.1f} s")
 
     def second(self, now: float) -> bool:
         """Whether a second is over; then its rates are worked out."""
@@ -140,7 +125,7 @@ class Statistics:
         }
         if self.is_real_time:  # a replay's rows arrive at their own stamps, and its pauses are the file's
             now = self._inbox.clock()
-            silent = [why for pulse in self.pulses if (why := pulse.why_old(now))]
+            silent = [why for feed in self.feeds if (why := feed.why_old(now))]
             result |= {"delay": self.delay, "silent": silent}
         return result
 

@@ -12,7 +12,7 @@ from terragrip.live.core import Core
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
 from terragrip.live.inbox import Inbox
-from terragrip.live.message import ESTIMATE, GROUND, SETPOINT, SOIL, STATUS, Message
+from terragrip.live.message import ESTIMATE, EVENT, GROUND, SETPOINT, SOIL, STATUS, Message
 from terragrip.live.options import has_slips
 from terragrip.live.outbox import Outbox
 from terragrip.live.outputs import Event, Output, Refusal, Row
@@ -125,41 +125,38 @@ class VehicleRun:
 
     def announce(self) -> None:
         """Send the status to all listeners."""
-        self._send(Message(STATUS, self.core.time, data=self.statistics.to_dict(), vehicle=self.name))
+        self._send(STATUS, self.core.time, data=self.statistics.to_dict())
 
     def _publish(self, outputs: list[Output]) -> None:
         """Give what came out of the pipeline to every listener."""
         for output in outputs:
             if isinstance(output, Row):
                 self.statistics.row(output, self.inbox.clock())
-                self._send(Message(ESTIMATE, output.estimate.time, output, vehicle=self.name))
+                self._send(ESTIMATE, output.estimate.time, output)
                 self._advise(output)
             elif isinstance(output, Event):
                 self.statistics.event(output)
-                emit(logger, output.kind, **self._logged(output))
-                self._send(Message.of_event(output, self.name))
+                data = output.to_dict()
+                named = {"vehicle": self.name} if self.name else {}
+                emit(logger, output.kind, **named, **{name: data[name] for name in data if name != "kind"})
+                self._send(EVENT, output.time, data=data)
             elif not isinstance(output, Refusal):
                 self.statistics.ground = output
                 data = output.to_dict()
                 change = data.pop("change")
-                self._send(Message(SOIL, output.time, data=data, vehicle=self.name))
+                self._send(SOIL, output.time, data=data)
                 if change is not None:
-                    self._send(Message(GROUND, change["time"], data=change, vehicle=self.name))
+                    self._send(GROUND, change["time"], data=change)
 
     def _advise(self, row: Row) -> None:
         """Publish the set-point, where one is wanted and the estimates hold the wheels' slips."""
-        if self.setpoint is None or self.core.estimator is None:
-            return
-        if has_slips(self.core.estimator):
-            self._send(
-                Message(SETPOINT, row.estimate.time, data=self.setpoint.message(row), vehicle=self.name)
-            )
+        estimator = self.core.estimator
+        if self.setpoint is not None and estimator is not None and has_slips(estimator):
+            self._send(SETPOINT, row.estimate.time, data=self.setpoint.message(row))
 
-    def _send(self, message: Message) -> None:
+    def _send(
+        self, kind: str, time: float, row: Row | None = None, *, data: dict[str, Any] | None = None
+    ) -> None:
+        message = Message(kind, time, row, data, self.name)
         for listener in self.listeners:
             listener(message)
-
-    def _logged(self, event: Event) -> dict[str, Any]:
-        fields = event.to_dict()
-        del fields["kind"]
-        return {"vehicle": self.name, **fields} if self.name else fields
