@@ -19,22 +19,20 @@ static tg_real follow(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_rea
 
 /* Considered constants in closed form (physics.md 6): a wheel acceleration a too large is an adhesion J a/(r F) too large, and rho_s balances
  * the forces. */
-static void consider_statically(tg_estimator *e, const tg_drive *drive)
+static void consider_statically(tg_estimator *e, const tg_drive *drive, const tg_input *now)
 {
     const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
     const int32_t n = m->wheels;
     tg_belief *b = &e->belief;
     const tg_deviations *const d = &e->deviations;
-    tg_input u;
-    tgi_along(e, drive, &u);
-    tgi_deviations(e, &u, b->x);
+    tgi_deviations(e, now, b->x);
     memset(e->consider.s, 0, sizeof e->consider.s);
     for (int32_t c = 0; c < b->columns; c++) {
         tg_real acceleration = d->acceleration[c];
         for (int32_t i = 0; i < n; i++) {
             tg_real torque = m->inertia[i] * d->wheel_acceleration[i][c];
-            e->consider.s[i][c] = torque / (m->radius[i] * u.load[i]);
+            e->consider.s[i][c] = torque / (m->radius[i] * now->load[i]);
             acceleration += torque / (m->radius[i] * drive->mass);
         }
         e->consider.s[n][c] = acceleration / (m->gravity * drive->cosine + drive->hitch_load * drive->inverse_mass);
@@ -70,8 +68,8 @@ static void spread(tg_estimator *e, const tg_drive *drive)
     b->P[rho * stride + rho] = resistance;
 }
 
-/* One row of the algebraic method into the belief. `anew`: nothing continues from before (first sample, gap, standstill, change of direction). */
-void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew)
+/* One row of the algebraic method into the belief; `now`: its inputs along the travel. `anew`: nothing continues from before (first sample, gap, standstill, change of direction). */
+void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, const tg_input *now, int32_t anew)
 {
     const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
@@ -101,5 +99,5 @@ void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, in
     b->x[n] = (thrust - pull - drive->mass * (d * a->ground_rate + m->gravity * tgi_sin(slope)))
                     / (drive->mass * m->gravity * tgi_cos(slope) + drive->hitch_load);
     spread(e, drive);
-    consider_statically(e, drive);
+    consider_statically(e, drive, now);
 }

@@ -87,11 +87,11 @@ static void carry_shared(const tg_filter *f, int32_t pieces, tg_real *shared)
 }
 
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to restart. */
-static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_real dt, tg_real *q)
+static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, const tg_input *now, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
-    tg_input now, over;
+    tg_input over;
     tg_step step;
     int32_t pieces = 1;
     if (dt > s->max_step) {
@@ -99,8 +99,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         dt /= (tg_real)pieces;
         for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
     }
-    tgi_along(e, drive, &now);
-    inputs_over(e, drive, &now, &over);
+    inputs_over(e, drive, now, &over);
     measured(e, row, y, r);
     tgi_deviations(e, &over, e->belief.x);
     tg_status status = TG_OK;
@@ -109,7 +108,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_r
         if (status == TG_OK) tgi_follow(e, &e->deviations);
     }
     if (pieces > 1 && status == TG_OK) carry_shared(&e->filter, pieces, row->shared);
-    if (status == TG_OK) status = tg_filter_step_shared(&e->filter, dt, &over, &now, q, row->shared, y, r, &step);
+    if (status == TG_OK) status = tg_filter_step_shared(&e->filter, dt, &over, now, q, row->shared, y, r, &step);
     if (status != TG_OK) {
         tgi_forget(e);
         tgi_restart_from(e, row, 0);
@@ -147,7 +146,7 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * drive->inverse_mass, time, e->settings.load_filter);
 }
 
-static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_course course, tg_real dt, tg_real *q)
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, const tg_input *now, tg_course course, tg_real dt, tg_real *q)
 {
     int32_t sound = 1;
     tg_belief *b = &e->belief;
@@ -155,7 +154,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
     e->scene.anew = course == TG_TURN; /* to a smoother: values along the travel change their signs */
     b->channels = 0;
     if (e->settings.method == TG_ALGEBRAIC) {
-        if (course != TG_WAIT && course != TG_DRIFT && course != TG_REST) tgi_algebraic(e, row, drive, course != TG_GO);
+        if (course != TG_WAIT && course != TG_DRIFT && course != TG_REST) tgi_algebraic(e, row, drive, now, course != TG_GO);
         return 1;
     }
     if (course == TG_REST) tgi_rest_reading(e, row);
@@ -165,7 +164,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_cou
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
     if (course == TG_DRIFT) tgi_drift(e, dt);
     else if (course == TG_REST) tgi_rest(e, drive, row->time);
-    else if (course >= TG_START) sound = advance(e, row, drive, dt, q);
+    else if (course >= TG_START) sound = advance(e, row, drive, now, dt, q);
     tgi_believe(e);
     return sound;
 }
@@ -181,17 +180,16 @@ static int32_t wheels_are_silent(const tg_estimator *e, double time)
 #define TG_PEAK ((tg_real)2.4674) /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
 
 /* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. */
-static void chatter_of(tg_estimator *e, const tg_drive *drive)
+static void chatter_of(tg_estimator *e, const tg_row *row, const tg_drive *drive)
 {
-    const tg_settings *s = &e->settings;
-    for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const tg_hold *const h = &e->wheel[i];
-        const tg_real square = h->count > 1 ? tgi_chatter(h, s->noise[TG_WHEEL_SPEED + i]) : 0;
-        e->scene.chatter[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (s->machine.radius[i] * drive->load[i] * h->interval)) : 0;
+    const tg_machine *m = &e->settings.machine;
+    for (int32_t i = 0; i < m->wheels; i++) {
+        const tg_real square = row->chatter[i], time = e->wheel[i].interval;
+        e->scene.chatter[i] = square > 0 ? TG_PEAK * square * tgi_square(m->inertia[i] / (m->radius[i] * drive->load[i] * time)) : 0;
     }
 }
 
-static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
+static void report(tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_estimate *out)
 {
     const int32_t n = e->settings.machine.wheels;
     tg_real *o = out->value;
@@ -199,9 +197,10 @@ static void report(tg_estimator *e, const tg_drive *drive, tg_estimate *out)
     for (int32_t i = 0; i < n; i++) {
         e->scene.hub[i] = -(tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
         e->scene.across[i] = e->settings.wheel_ahead[i] * e->yaw_rate;
-        e->scene.turn[i] = tgi_turn_variance(&e->settings, i, e->belief.x[n + 2 + i], e->belief.x[n + 1], (tg_real)e->direction * e->unseen_turn);
     }
-    chatter_of(e, drive);
+    for (int32_t i = 0; i < n; i += TG_LANES)
+        lanes_store(e->scene.turn + i, tgi_turn_variance(&e->settings, i, lanes_load(e->belief.x + n + 2 + i), e->belief.x[n + 1], (tg_real)e->direction * e->unseen_turn));
+    chatter_of(e, row, drive);
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
@@ -289,6 +288,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     if (e->started && !(sample->time > e->time)) return TG_TIME_REVERSED;
     tg_row row;
     tg_drive drive;
+    tg_input now;
     tg_status status = tgi_clean(e, sample, &row);
     if (status != TG_OK) return status;
     for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN; /* what nothing below writes */
@@ -307,20 +307,21 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     tgi_update_inputs(e, &row, dt, &drive);
     tgi_input_noise(e, &drive, dt, &row, q);
     tgi_loads(e, &row, &drive);
+    tgi_along(e, &drive, &now);
     tg_course course = course_of(e, &row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row.time;
     tgi_reckon(e, &drive, dt, course == TG_GO, &row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
     report_adaptation(e, out->value);
-    const int32_t lost = !go_on(e, &row, &drive, course, dt, q), breaks = gap || lost;
+    const int32_t lost = !go_on(e, &row, &drive, &now, course, dt, q), breaks = gap || lost;
     balance_forces(e, &drive, row.time);
     tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
     if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
     tgi_end_row(e, &row, out);
-    tgi_along(e, &drive, &e->held);
-    report(e, &drive, out);
+    e->held = now;
+    report(e, &row, &drive, out);
     const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
     tgi_watch_over(e, &row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
     out->event = tgi_event_of(e, &row, gap || blind || course == TG_WAIT, lost);

@@ -26,6 +26,12 @@ typedef struct { /* a low-passed signal */
     int32_t seen;
 } tg_lowpass;
 
+typedef struct { /* a measured speed as it decides standstill and the direction of travel */
+    tg_real settled, soon; /* low-passed exactly, and as little as its noise allows */
+    double time;           /* of its last sample */
+    int32_t seen;
+} tgi_settling;
+
 typedef struct { /* one row, calibrated and checked, in the vehicle's own directions; NaN = missing */
     double time;
     tg_real value[TG_SLOTS];
@@ -34,9 +40,10 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     int32_t reckoned; /* the ground speed is not measured but reckoned */
     int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
     tg_real wheel_variance[8];
+    tg_real chatter[8]; /* variance of the wheel's speed by what alternates from sample to sample, see inputs.c */
     tg_real ground_variance;
     tg_real turn_variance; /* of the ground speed, by what a turn adds to it at its receiver */
-    tg_real doubt[9]; /* of the wheel speeds and the ground speed: variance beside the sensor's, of a spike */
+    tg_real doubt[TG_GROUND_SPEED + 1]; /* by place in a sample: variance beside the sensor's, of a spike */
     tg_real shared[9]; /* of the wheel speeds' and the ground speed's noise: variance that neighbouring steps share, and one step does not have */
     tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */
 } tg_row;
@@ -202,6 +209,9 @@ typedef struct { /* what follows from the settings alone */
     tg_real limit[TG_SLOTS];        /* beyond it a value is a defect; negative: this machine has no such channel */
     tg_real inverse_gain[TG_SLOTS];
     tg_real variance[TG_SLOTS];     /* noise squared */
+    tg_real agility[TG_GROUND_SPEED + 1]; /* rad/s^2, m/s^2: a change of each speed that a vehicle can do */
+    tg_real soon[TG_GROUND_SPEED + 1]; /* of each speed, least share of a sample in its low-pass */
+    tg_real trust;                  /* in a ground speed against wheels, by its noise */
     tg_real inverse_inertia[8];
     tg_real inverse_mass;
     tg_real mean_radius;            /* m */
@@ -245,8 +255,8 @@ struct tg_estimator {
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
     tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate; else 0 */
     double slow_time;          /* when the ground speed was last near 0 */
-    tg_lowpass soon[8], soon_ground; /* speeds, low-passed as little as can be */
-    tg_lowpass wheel_speed[8], ground_speed, acceleration, lateral, balance;
+    tgi_settling settling[TG_GROUND_SPEED + 1]; /* by place in a sample */
+    tg_lowpass acceleration, lateral, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;
     tgi_roughness roughness;
@@ -284,7 +294,7 @@ int32_t tgi_event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int3
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
-int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time);
+int32_t tgi_is_recent(const tg_estimator *e, int32_t slot, double time);
 void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 
@@ -301,7 +311,6 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
 void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt);
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
-tg_real tgi_chatter(const tg_hold *h, tg_real noise);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */
@@ -367,7 +376,7 @@ void tgi_rest(tg_estimator *e, const tg_drive *drive, double time);
 void tgi_drift(tg_estimator *e, tg_real dt);
 
 /* algebraic.c */
-void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t anew);
+void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, const tg_input *now, int32_t anew);
 
 /* curves.c */
 void tgi_reset_curves(tg_estimator *e);

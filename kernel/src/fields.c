@@ -40,6 +40,7 @@ static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, r
                                  INTEGERS(T, count, 0, 100), FLAG(T, fresh), END};
 #undef T
 static const tgi_field lowpass[] = {REALS(tg_lowpass, value), DOUBLES(tg_lowpass, time), FLAG(tg_lowpass, seen), END};
+static const tgi_field settling[] = {REALS(tgi_settling, settled), REALS(tgi_settling, soon), DOUBLES(tgi_settling, time), FLAG(tgi_settling, seen), END};
 
 #define T tgi_slope
 static const tgi_field slope[] = {REALS(T, speed), REALS(T, error), REALS(T, speed_variance), REALS(T, covariance), REALS(T, error_variance),
@@ -95,8 +96,8 @@ const tgi_field tgi_estimator_fields[] = {
     REALS(T, deviations), FLAG(T, started), FLAG(T, seen_motion), FLAG(T, standing), INTEGERS(T, direction, -1, 1), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
     HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), FLAG(T, sparse_wheels), INTEGERS(T, unseen, 0, 3),
-    REALS(T, yaw_rate), DOUBLES(T, yaw_time), REALS(T, unseen_turn), DOUBLES(T, slow_time), LOWPASS(soon), LOWPASS(soon_ground), LOWPASS(wheel_speed), LOWPASS(ground_speed), LOWPASS(acceleration), LOWPASS(lateral),
-    LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed),
+    REALS(T, yaw_rate), DOUBLES(T, yaw_time), REALS(T, unseen_turn), DOUBLES(T, slow_time), INSIDE(T, settling, tgi_settling, settling),
+    LOWPASS(acceleration), LOWPASS(lateral), LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed),
     DOUBLES(T, ground_time), REALS(T, shock),
     REALS(T, held), INSIDE(T, belief, tg_belief, belief), INSIDE(T, algebra, tg_algebra, algebra), INSIDE(T, watch, tgi_watch, watch),
     REALS(T, scene), REALS(T, curve), REALS(T, wheel_curve), REALS(T, curve_std), REALS(T, wheel_curve_std), REALS(T, curve_wait),

@@ -6,15 +6,17 @@
 #define TG_CHATTER ((tg_real)2 / 3)
 #define TG_AHEAD 4 /* intervals that the change over one of them is continued at most: of two samples at nearly one instant it is their noise */
 
-/* The input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
- * torque's noise would shake omega more than the wheel ever does. */
-static void track(tg_hold *h, tg_real x, tg_real noise, tg_real interval, tg_real lag)
+/* An input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
+ * torque's noise would shake omega more than the wheel ever does. Its mean over the row's step is that of a straight line since the last
+ * sample, when it was `before`. */
+static void track(tg_hold *h, tg_real x, tg_real before, tg_real noise, tg_real interval, tg_real dt, tg_real lag)
 {
     tg_real prior = h->variance + tgi_motion(h, noise), gain = prior / (prior + noise * noise);
     const tg_real least = interval / (lag + interval);
     if (!(gain > least)) gain = least;
     h->value += gain * (x - h->value);
     h->variance = gain * noise * noise;
+    h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2;
 }
 
 /* The value before a sample that follows a spike: the spike's own where the sample confirms it, else the last one that was none. */
@@ -35,8 +37,9 @@ static void begin(tg_hold *h, tg_real x, tg_real noise)
 /* Add the row's sample at `slot`, if it has one, the row before it being dt old. The mean square of the input's increments is kept over
  * about 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty,
  * and it enters the mean square clipped. `rate`: the change a second that is no spike, 0 where it is not known; it counts over the usual
- * interval at most, since within a gap nearly everything is possible. Where it is known, a spike is one from the first samples on, else only
- * once the increments are known. Those of a standstill show nothing of the start. */
+ * interval at most, since within a gap nearly everything is possible. Where it is known, of a speed, a spike is one from the first samples on,
+ * else only once the increments are known, and what drives the model between samples is worked out. Increments of a standstill show nothing
+ * of the start. */
 void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real dt, tg_real rate)
 {
     const tg_tuned *const k = &e->settings.tuned;
@@ -56,12 +59,11 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
             h->mean = h->calm = before;
             change = most;
         } else {
-            track(h, x, noise, interval, k->input_lag);
+            if (!(rate > 0)) track(h, x, before, noise, interval, dt, k->input_lag);
             h->calm = x;
             const tg_real ahead = TG_AHEAD * h->interval;
             h->bend = h->count > 1 ? tgi_square(x - before - h->rate * (interval < ahead ? interval : ahead)) : 0;
             h->rate = (x - before) / interval;
-            h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2; /* of a straight line since the last sample */
             h->fresh = 1;
         }
         tg_real memory = interval / (k->increment_memory + interval);
@@ -164,7 +166,7 @@ static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_r
 /* Variance of the change of a wheel's speed from one sample to the next that the third reverses, beyond its white noise; 0 below
  * TG_CHATTER of the whole change. An adhesion that follows so fast an oscillation is half a sample late, and farther from the truth than
  * its mean. White noise, whatever its size, has one half (docs/decisions/0026). */
-tg_real tgi_chatter(const tg_hold *h, tg_real noise)
+static tg_real chatter(const tg_hold *h, tg_real noise)
 {
     const tg_real back = h->bends / 2 - h->level, white = tgi_square(noise);
     return back > TG_CHATTER * h->level && back > 4 * white ? back - white : 0;
@@ -180,8 +182,10 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const int32_t n = s->machine.wheels;
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
     q[n] = walking_forces(e, drive, dt) + drive->drift_by_slope;
-    for (int32_t i = 0; i < n; i++)
-        if (e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = tgi_chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]) * dt / e->wheel[i].interval;
+    for (int32_t i = 0; i < n; i++) {
+        row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);
+        if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * dt / e->wheel[i].interval;
+    }
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
@@ -230,6 +234,7 @@ void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u)
 {
     const tg_real d = (tg_real)e->direction;
+    memset(u, 0, sizeof *u);
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
         u->torque[i] = d * drive->torque[i];
         u->load[i] = drive->load[i];
@@ -244,7 +249,8 @@ void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u)
 static int32_t is_silent(const tg_estimator *e, const tg_hold *h, double time)
 {
     const tg_real gap = e->settings.gap, most = gap / 2;
-    return h->count == 0 || time - h->time > (double)(gap + TG_PAUSE * (h->interval < most ? h->interval : most));
+    if (h->count == 0) return 1;
+    return time - h->time > (double)gap && time - h->time > (double)(gap + TG_PAUSE * (h->interval < most ? h->interval : most));
 }
 
 /* Whether the ground speed is silent while the vehicle drives: it is reckoned. */

@@ -43,7 +43,13 @@
 
 #define TG_LANES 4
 
+#ifdef TG_FLOAT
+typedef int32_t tg_choice_bits;
+#else
+typedef int64_t tg_choice_bits;
+#endif
 typedef tg_real tg_lanes __attribute__((vector_size(TG_LANES * sizeof(tg_real))));
+typedef tg_choice_bits tg_choice __attribute__((vector_size(TG_LANES * sizeof(tg_real)))); /* all bits of a lane, or none: (tg_choice)(a > b) */
 
 TG_INLINE tg_lanes lanes_all(tg_real x) { return (tg_lanes){x, x, x, x}; }
 TG_INLINE tg_real lanes_at(tg_lanes a, int i) { return a[i]; }
@@ -55,5 +61,17 @@ TG_INLINE tg_lanes lanes_load(const tg_real *p)
     return a;
 }
 TG_INLINE void lanes_store(tg_real *p, tg_lanes a) { memcpy(p, &a, sizeof a); }
+TG_INLINE tg_lanes lanes_where(tg_choice yes, tg_lanes a, tg_lanes b) { return (tg_lanes)((yes & (tg_choice)a) | (~yes & (tg_choice)b)); }
+TG_INLINE tg_lanes lanes_max(tg_lanes a, tg_lanes b) { return lanes_where((tg_choice)(a > b), a, b); }
+TG_INLINE tg_lanes lanes_min(tg_lanes a, tg_lanes b) { return lanes_where((tg_choice)(a < b), a, b); }
+TG_INLINE tg_lanes lanes_fabs(tg_lanes a) { return (tg_lanes)((tg_choice)a & ~(tg_choice)lanes_all((tg_real)-0.0)); }
+TG_INLINE tg_lanes lanes_sqrt(tg_lanes a) { return lanes_of(tgi_sqrt(a[0]), tgi_sqrt(a[1]), tgi_sqrt(a[2]), tgi_sqrt(a[3])); }
 TG_INLINE tg_real lanes_sum(tg_lanes a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+/* The same of four at once, each rounded alike. */
+TG_INLINE tg_lanes lanes_sums(const tg_lanes *a)
+{
+    const tg_lanes low = lanes_of(a[0][0], a[1][0], a[0][2], a[1][2]) + lanes_of(a[0][1], a[1][1], a[0][3], a[1][3]);
+    const tg_lanes high = lanes_of(a[2][0], a[3][0], a[2][2], a[3][2]) + lanes_of(a[2][1], a[3][1], a[2][3], a[3][3]);
+    return lanes_of(low[0], low[1], high[0], high[1]) + lanes_of(low[2], low[3], high[2], high[3]);
+}
 #endif

@@ -100,7 +100,7 @@ static void turn_tyres(const tg_estimator *e, tg_drive *drive)
     const tg_settings *s = &e->settings;
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const tg_real back = -d * s->rolling_radius[i] * e->soon[i].value / s->standstill_speed;
+        const tg_real back = -d * s->rolling_radius[i] * e->settling[i].soon / s->standstill_speed;
         if (!(back > 0)) continue;
         const tg_real resistance = 2 * d * (back < 1 ? back : 1) * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];
         drive->torque[i] += resistance;

@@ -74,18 +74,16 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
  * is left out until then. */
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
 {
-    const tg_settings *s = &e->settings;
-    const int32_t n = s->machine.wheels;
-    tg_real rate[9] = {0};
-    for (int32_t i = 0; i <= n; i++) {
-        rate[i] = s->tuned.agility * s->machine.gravity / (i < n ? s->rolling_radius[i] : 1);
-        tgi_hold_update(e, i < n ? &e->wheel[i] : &e->ground, row, i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED, 0, rate[i]);
-    }
+    const tg_real *const rate = e->constants.agility;
+    const int32_t n = e->settings.machine.wheels;
+    for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, 0, rate[i]);
+    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, 0, rate[TG_GROUND_SPEED]);
     tgi_judge_leaps(e->wheel, rate, n, n, row->time, dt);
     for (int32_t i = 0; i <= n; i++) {
         const tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
-        row->doubt[i] = h->time == row->time ? h->spike : 0;
-        row->outlier |= row->doubt[i] > 0;
+        const tg_real doubt = h->time == row->time ? h->spike : 0;
+        row->doubt[i < n ? TG_WHEEL_SPEED + i : TG_GROUND_SPEED] = doubt;
+        row->outlier |= doubt > 0;
     }
     tg_hold *const a = &e->forward;
     tgi_hold_update(e, a, row, TG_ACCELERATION_X, 0, 0);
@@ -95,29 +93,22 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
     }
 }
 
-/* A low-pass goes on by this share of what a sample is beyond it; the first sample is used as it is. */
-static tg_real go_on(tg_lowpass *f, tg_real x, double time, tg_real gain)
+/* First-order low-pass by the backward Euler rule over the time since the last sample; the first one is used as it is. */
+tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
 {
-    f->value = f->seen ? f->value + gain * (x - f->value) : x;
+    const tg_real dt = (tg_real)(time - f->time);
+    if (isnan(x)) return f->value;
+    f->value = f->seen ? f->value + dt / (tau + dt) * (x - f->value) : x;
     f->time = time;
     f->seen = 1;
     return f->value;
 }
 
-/* First-order low-pass by the backward Euler rule over the time since the last sample. */
-tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau)
+/* Whether this wheel's speed, or the ground's, was measured lately enough to say how the vehicle moves. */
+int32_t tgi_is_recent(const tg_estimator *e, int32_t slot, double time)
 {
-    const tg_real dt = (tg_real)(time - f->time);
-    return isnan(x) ? f->value : go_on(f, x, time, dt / (tau + dt));
-}
-
-/* Whether the speed of wheel `place`, or that of the ground where `place` is the number of wheels, was measured lately enough to say how the
- * vehicle moves. */
-int32_t tgi_is_recent(const tg_estimator *e, int32_t place, double time)
-{
-    const int32_t wheel = place < e->settings.machine.wheels;
-    const tg_lowpass *const f = wheel ? &e->wheel_speed[place] : &e->ground_speed;
-    return f->seen && time - f->time <= (wheel ? (double)e->settings.gap : TG_GROUND_AGE);
+    const tgi_settling *const p = &e->settling[slot];
+    return p->seen && time - p->time <= (slot < TG_GROUND_SPEED ? (double)e->settings.gap : TG_GROUND_AGE);
 }
 
 /* The yaw rate if no wheel slipped more than its axle's others: that of the axle where the rims of left and right differ least, since a turn
@@ -131,7 +122,7 @@ static tg_real turn_of_rims(const tg_estimator *e, double time)
         tg_real count = 0, side = 0, rim = 0, squares = 0, products = 0;
         for (int32_t i = 0; i < s->machine.wheels; i++) {
             if (s->wheel_axle[i] != k || !tgi_is_recent(e, i, time)) continue;
-            const tg_real speed = s->rolling_radius[i] * e->wheel_speed[i].value;
+            const tg_real speed = s->rolling_radius[i] * e->settling[i].settled;
             count++;
             side += s->wheel_side[i];
             rim += speed;
@@ -166,29 +157,26 @@ static int32_t moves(tg_estimator *e, tg_real ground, double time)
     return !e->standing || time - e->slow_time > (double)e->settings.tuned.leap;
 }
 
-typedef struct { /* of a low-pass: worked out once for all speeds of a row whose last samples came together */
-    tg_real tau, dt, gain;
-} settling;
+typedef struct { /* of low-passes: worked out once for all speeds of a row whose last samples came together */
+    tg_real tau, dt, exact, slow; /* shares of a sample: exact also where samples are further apart than tau; by the backward Euler rule */
+} shares;
 
-/* First-order low-pass, exact also where samples are further apart than tau. */
-static tg_real settle(tg_lowpass *f, tg_real x, double time, settling *pass)
+/* Take the row's speed at `slot`, if it is measured and no spike. */
+static const tgi_settling *settle(tg_estimator *e, const tg_row *row, int32_t slot, shares *pass)
 {
-    if (isnan(x)) return f->value;
-    const tg_real dt = (tg_real)(time - f->time);
+    tgi_settling *const p = &e->settling[slot];
+    const tg_real x = row->value[slot], dt = (tg_real)(row->time - p->time);
+    if (isnan(x) || row->doubt[slot] > 0) return p;
     if (dt != pass->dt) {
         pass->dt = dt;
-        pass->gain = -tgi_expm1(-dt / pass->tau);
+        pass->exact = -tgi_expm1(-dt / pass->tau);
+        pass->slow = dt / (pass->tau + dt);
     }
-    return go_on(f, x, time, pass->gain);
-}
-
-/* A speed, low-passed only until its noise is a quarter of the threshold of standstill, and not longer than tau. */
-static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real noise, tg_real threshold)
-{
-    if (isnan(x)) return f->value;
-    const tg_real ratio = tgi_square(threshold / (4 * noise)), dt = (tg_real)(time - f->time), slow = dt / (tau + dt);
-    const tg_real gain = ratio < 1 ? 2 * ratio / (1 + ratio) : 1;
-    return go_on(f, x, time, tgi_max(gain, slow));
+    p->settled = p->seen ? p->settled + pass->exact * (x - p->settled) : x;
+    p->soon = p->seen ? p->soon + tgi_max(e->constants.soon[slot], pass->slow) * (x - p->soon) : x;
+    p->time = row->time;
+    p->seen = 1;
+    return p;
 }
 
 /* Low-passed speeds decide standstill, speeds low-passed as little as their noise allows the direction of travel, both with hysteresis
@@ -196,17 +184,13 @@ static tg_real soon(tg_lowpass *f, tg_real x, double time, tg_real tau, tg_real 
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *s = &e->settings;
-    const tg_real tau = s->tuned.settle;
-    settling pass = {tau, 0, 0};
+    shares pass = {s->tuned.settle, 0, 0, 0};
     int32_t n = s->machine.wheels, seen = 0;
-    const tg_real seen_ground = row->doubt[n] > 0 ? (tg_real)NAN : row->value[TG_GROUND_SPEED];
-    tg_real fastest = 0, soonest = 0, forward = 0, backward = 0, over = 0, rim = 0, ground = settle(&e->ground_speed, seen_ground, row->time, &pass);
-    tg_real course = soon(&e->soon_ground, seen_ground, row->time, tau, s->noise[TG_GROUND_SPEED], s->standstill_speed);
+    const tgi_settling *const ground = settle(e, row, TG_GROUND_SPEED, &pass);
+    tg_real fastest = 0, soonest = 0, forward = 0, backward = 0, over = 0, rim = 0, course = ground->soon;
     for (int32_t i = 0; i < n; i++) {
-        const tg_real measured = row->doubt[i] > 0 ? (tg_real)NAN : row->value[TG_WHEEL_SPEED + i];
-        const tg_real w = s->rolling_radius[i] * settle(&e->wheel_speed[i], measured, row->time, &pass);
-        const tg_real r = s->rolling_radius[i], noise = s->noise[TG_WHEEL_SPEED + i];
-        const tg_real now = r * soon(&e->soon[i], measured, row->time, tau, noise, s->standstill_speed / r);
+        const tgi_settling *const wheel = settle(e, row, TG_WHEEL_SPEED + i, &pass);
+        const tg_real w = s->rolling_radius[i] * wheel->settled, now = s->rolling_radius[i] * wheel->soon;
         if (!tgi_is_recent(e, i, row->time)) continue;
         if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
         if (now > forward) forward = now;
@@ -216,9 +200,9 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
         if (tgi_fabs(w) > fastest) fastest = tgi_fabs(w);
     }
     if (seen > 0) rim /= (tg_real)seen;
-    if (tgi_is_recent(e, n, row->time)) {
+    if (tgi_is_recent(e, TG_GROUND_SPEED, row->time)) {
         seen++;
-        if (moves(e, ground, row->time)) over = tgi_fabs(ground);
+        if (moves(e, ground->settled, row->time)) over = tgi_fabs(ground->settled);
     } else {
         course = rim;
     }
@@ -226,7 +210,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_real threshold = s->standstill_speed, leave = e->standing ? (tg_real)1.25 : 1; /* a ground speed at rest wanders by its noise */
     e->standing = fastest < leave * threshold && soonest < leave * threshold && over < (e->standing ? 2 : 1) * threshold + 2 * s->noise[TG_GROUND_SPEED];
 
-    const tg_real trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed)); /* a noisy ground speed counts less than the wheels */
+    const tg_real trust = e->constants.trust;
     const int32_t torn =
         forward > threshold && backward > threshold && tgi_fabs(course) > threshold + 2 * s->noise[TG_GROUND_SPEED];
     /* Wheels that turn against others brake, or swing in the air. */

@@ -106,7 +106,7 @@ static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_rea
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q)
 {
     const tg_tuned *const k = &e->settings.tuned;
-    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[e->settings.machine.wheels];
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED];
     if (!is_missing(e, row, dt, k->silence)) return;
     if (e->standing && e->slope.running) tgi_slope_correct(&e->slope, 0, tgi_square(e->settings.standstill_speed) * (1 + 2 * k->alike / dt));
     if (!goes) return;

@@ -43,10 +43,10 @@ void tgi_restart_from(tg_estimator *e, const tg_row *row, tg_real walk)
         rim += s->rolling_radius[i] * y[TG_WHEEL_SPEED + i];
         seen++;
     }
-    int32_t late = isnan(v) && tgi_is_recent(e, n, row->time);
-    if (late) v = e->ground_speed.value;
+    int32_t late = isnan(v) && tgi_is_recent(e, TG_GROUND_SPEED, row->time);
+    if (late) v = e->settling[TG_GROUND_SPEED].settled;
     else if (isnan(v)) v = seen ? rim / (tg_real)seen : 0;
-    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[n];
+    tg_real broad = tgi_square((tg_real)0.3 * tgi_fabs(v) + (tg_real)0.1), noise = tgi_square(s->noise[TG_GROUND_SPEED]) + row->doubt[TG_GROUND_SPEED];
     x[n] = d * v;
     P[n] = isnan(y[TG_GROUND_SPEED]) ? (late ? noise + (tg_real)0.01 : broad) : noise;
     for (int32_t i = 0; i < n; i++) {
@@ -93,9 +93,9 @@ void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
     const int32_t n = s->machine.wheels;
     tg_real d = (tg_real)e->direction, x[9], P[9];
     for (int32_t j = 0; j <= n; j++) {
-        const int32_t fresh = tgi_is_recent(e, j, time);
-        x[j] = fresh ? d * (j < n ? e->wheel_speed[j].value : e->ground_speed.value) : 0;
-        P[j] = tgi_square(fresh ? s->noise[j < n ? TG_WHEEL_SPEED + j : TG_GROUND_SPEED] : s->standstill_speed / (j < n ? s->rolling_radius[j] : 1));
+        const int32_t slot = j < n ? TG_WHEEL_SPEED + j : TG_GROUND_SPEED, fresh = tgi_is_recent(e, slot, time);
+        x[j] = fresh ? d * e->settling[slot].settled : 0;
+        P[j] = tgi_square(fresh ? s->noise[slot] : s->standstill_speed / (j < n ? s->rolling_radius[j] : 1));
     }
     restart(e, 0, x, P);
     if (e->distance > 0) return;

@@ -240,6 +240,13 @@ static void place_wheels(const tg_settings *s, tgi_constants *c)
     }
 }
 
+/* Of a speed with this noise, the least share of a sample in a low-pass that leaves a quarter of the threshold of standstill as noise. */
+static tg_real soon(tg_real threshold, tg_real noise)
+{
+    const tg_real ratio = tgi_square(threshold / (4 * noise));
+    return ratio < 1 ? 2 * ratio / (1 + ratio) : 1;
+}
+
 static void work_out_constants(const tg_settings *s, tgi_constants *c)
 {
     memset(c, 0, sizeof *c);
@@ -254,11 +261,16 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     for (int32_t i = 0; i < m->wheels; i++) {
         const tg_real load = s->load_share[s->wheel_axle[i]] * s->wheel_share[i] * weight;
         c->inverse_inertia[i] = 1 / m->inertia[i];
+        c->agility[i] = s->tuned.agility * m->gravity / s->rolling_radius[i];
+        c->soon[i] = soon(s->standstill_speed / s->rolling_radius[i], s->noise[TG_WHEEL_SPEED + i]);
         c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
         c->mean_radius += s->rolling_radius[i] / (tg_real)m->wheels;
         c->unknown_torque[i] = tgi_square(s->tuned.unknown_torque * m->radius[i] * load);
         c->least_load[i] = s->tuned.least_load * load;
     }
+    c->agility[TG_GROUND_SPEED] = s->tuned.agility * m->gravity;
+    c->soon[TG_GROUND_SPEED] = soon(s->standstill_speed, s->noise[TG_GROUND_SPEED]);
+    c->trust = 1 / (1 + tgi_square(s->noise[TG_GROUND_SPEED] / s->standstill_speed));
     const tg_real T = natural_time(m);
     c->force_walk = force_walk(s);
     c->mounting_walk = s->tuned.mounting_walk / T;
@@ -329,7 +341,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
     e->yaw_time = -(double)INFINITY;
-    work_out_constants(settings, &e->constants);
+    work_out_constants(&e->settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
     tgi_reset_slips(e);

@@ -1,18 +1,17 @@
-/* Slip of a wheel from its speed and its hub's. */
+/* Slip of wheels from their speeds and their hubs'. */
 #ifndef TG_SLIP_H
 #define TG_SLIP_H
 #include "model.h"
 
-typedef struct { /* slip, and its change with omega, v and the relative radius */
-    tg_real slip, wheel, ground, radius;
+typedef struct { /* of four wheels: slip, and its change with omega, v and the relative radius */
+    tg_lanes slip, wheel, ground, radius;
 } tgi_slip;
 
-/* Speed of a hub that moves at `along` in the vehicle's direction and at `across` sideways; a steered wheel points along its path. */
-TG_INLINE tg_real tgi_hub_of(tg_real along, tg_real across)
+/* Speed of hubs that move at `along` in the vehicle's direction and at `across` sideways; a steered wheel points along its path. */
+TG_INLINE tg_lanes tgi_hub_of(tg_lanes along, tg_lanes across)
 {
-    if (across == 0) return along;
-    const tg_real way = tgi_sqrt(along * along + across * across);
-    return along < 0 ? -way : way;
+    const tg_lanes none = lanes_all(0), way = lanes_sqrt(along * along + across * across);
+    return lanes_where((tg_choice)(across == none), along, lanes_where((tg_choice)(along < none), -way, way));
 }
 
 /* Speed of the vehicle in its own direction, from the speed `there` of its receiver, whose place goes round with it at `yaw`. */
@@ -24,24 +23,26 @@ TG_INLINE tg_real tgi_middle_of(const tg_settings *s, tg_real there, tg_real yaw
 }
 
 /* Slip (paper eq. 6): (rim - travel)/larger. Where wheel and vehicle both creep, the divisor is floored. */
-TG_INLINE tgi_slip tgi_slip_of(tg_real omega, tg_real v, tg_real radius, tg_real least)
+TG_INLINE tgi_slip tgi_slip_of(tg_lanes omega, tg_lanes v, tg_lanes radius, tg_real least)
 {
-    const tg_real rim = radius * tgi_fabs(omega), travel = tgi_fabs(v), larger = rim > travel ? rim : travel;
-    const tg_real inverse = 1 / (larger > least ? larger : least), s = (rim - travel) * inverse;
-    const tg_real moving = larger > least ? s : 0; /* the divisor moves too, unless floored */
-    const tg_real by_rim = inverse * (1 - (rim >= travel ? moving : 0)), by_travel = -inverse * (1 + (rim >= travel ? 0 : moving));
-    const tgi_slip result = {s, omega < 0 ? -radius * by_rim : radius * by_rim, v < 0 ? -by_travel : by_travel, rim * by_rim};
+    const tg_lanes none = lanes_all(0), rim = radius * lanes_fabs(omega), travel = lanes_fabs(v), larger = lanes_max(rim, travel);
+    const tg_lanes inverse = 1 / lanes_max(larger, lanes_all(least)), s = (rim - travel) * inverse;
+    const tg_lanes moving = lanes_where((tg_choice)(larger > least), s, none); /* the divisor moves too, unless floored */
+    const tg_choice drives = (tg_choice)(rim >= travel);
+    const tg_lanes by_rim = inverse * (1 - lanes_where(drives, moving, none)), by_travel = -inverse * (1 + lanes_where(drives, none, moving));
+    const tgi_slip result = {s, lanes_where((tg_choice)(omega < none), -radius * by_rim, radius * by_rim),
+                             lanes_where((tg_choice)(v < none), -by_travel, by_travel), rim * by_rim};
     return result;
 }
 
-/* Variance of the slip of wheel i by a turn of which the rims show `rate`: where wheels steer it is all of that, where they skid about half.
- * `v`: of the vehicle. */
-TG_INLINE tg_real tgi_turn_variance(const tg_settings *s, int32_t i, tg_real omega, tg_real v, tg_real rate)
+/* Variance of the slip of wheels i to i + 3 by a turn of which the rims show `rate`: where wheels steer it is all of that, where they skid
+ * about half. `v`: of the vehicle. */
+TG_INLINE tg_lanes tgi_turn_variance(const tg_settings *s, int32_t i, tg_lanes omega, tg_real v, tg_real rate)
 {
-    if (rate == 0) return 0;
-    const tg_real hub = tgi_hub_of(tgi_middle_of(s, v, rate) - s->wheel_side[i] * rate, s->wheel_ahead[i] * rate), radius = s->rolling_radius[i];
-    const tg_real change = tgi_slip_of(omega, hub, radius, s->standstill_speed).slip - tgi_slip_of(omega, v, radius, s->standstill_speed).slip;
+    if (rate == 0) return lanes_all(0);
+    const tg_lanes hub = tgi_hub_of(tgi_middle_of(s, v, rate) - lanes_load(s->wheel_side + i) * rate, lanes_load(s->wheel_ahead + i) * rate);
+    const tg_lanes radius = lanes_load(s->rolling_radius + i);
+    const tg_lanes change = tgi_slip_of(omega, hub, radius, s->standstill_speed).slip - tgi_slip_of(omega, lanes_all(v), radius, s->standstill_speed).slip;
     return change * change / 2;
 }
-
 #endif

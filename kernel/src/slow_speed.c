@@ -10,9 +10,8 @@
 /* At rest: `row` may hold one more reading. */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row)
 {
-    const int32_t n = e->settings.machine.wheels;
     tgi_slow_speed *const s = &e->slow_speed;
-    if (isnan(row->value[TG_GROUND_SPEED]) || row->doubt[n] > 0) return;
+    if (isnan(row->value[TG_GROUND_SPEED]) || row->doubt[TG_GROUND_SPEED] > 0) return;
     s->count += 1;
     s->mean += (row->value[TG_GROUND_SPEED] - s->mean) / s->count;
 }
@@ -37,10 +36,9 @@ void tgi_watch_innovation(tg_estimator *e, const tg_row *row, tg_real innovation
 {
     tgi_slow_speed *const s = &e->slow_speed;
     const tg_tuned *const k = &e->settings.tuned;
-    const int32_t n = e->settings.machine.wheels;
     const tg_real most = tgi_square(k->spike) * variance;
     if (isnan(innovation)) return;
-    if (row->reckoned || row->doubt[n] > 0) {
+    if (row->reckoned || row->doubt[TG_GROUND_SPEED] > 0) {
         s->innovation = 0;
         return;
     }

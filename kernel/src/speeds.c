@@ -247,13 +247,18 @@ static void samples_of(const tg_estimator *e, const tg_row *row, const tgi_speed
     const tg_settings *set = &e->settings;
     const tg_real lean = tgi_square(set->noise[TG_YAW_RATE]);
     const int32_t n = set->machine.wheels;
+    tg_real extra[TG_MAX_WHEELS]; /* what steered hubs go faster than along the vehicle */
     const tg_real ground = s->begun != 0 || isnan(row->value[TG_GROUND_SPEED]) ? s->x[0] : row->value[TG_GROUND_SPEED];
     in->count = 0;
     in->y[0] = row->value[TG_GROUND_SPEED];
     in->variance[0] = row->ground_variance;
+    for (int32_t i = 0; i < n; i += TG_LANES) {
+        const tg_lanes along = ground - lanes_load(set->wheel_side + i) * s->yaw;
+        lanes_store(extra + i, tgi_hub_of(along, lanes_load(set->wheel_ahead + i) * s->yaw) - along);
+    }
     for (int32_t i = 0; i < n; i++) {
-        const tg_real r = set->rolling_radius[i], side = set->wheel_side[i], along = ground - side * s->yaw;
-        in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw - (tgi_hub_of(along, set->wheel_ahead[i] * s->yaw) - along);
+        const tg_real r = set->rolling_radius[i], side = set->wheel_side[i];
+        in->y[1 + i] = s->open != 0 ? (tg_real)NAN : r * row->value[TG_WHEEL_SPEED + i] + side * s->yaw - extra[i];
         in->variance[1 + i] = r * r * e->constants.variance[TG_WHEEL_SPEED + i] + (s->yaw != 0 ? side * side * lean : 0);
     }
     for (int32_t c = 0; c <= n; c++)
@@ -307,7 +312,8 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     tgi_speeds_report(&e->settings, s, out->value);
     const int32_t open = is_blind(s, n);
     e->scene.late = tgi_square(e->settings.ground_speed_delay * s->x[1]) + s->slow;
-    for (int32_t i = 0; i < n; i++) e->scene.turn[i] = tgi_turn_variance(&e->settings, i, out->value[TG_OUT_WHEEL_SPEED + i], s->x[0], s->unseen_turn);
+    for (int32_t i = 0; i < n; i += TG_LANES)
+        lanes_store(e->scene.turn + i, tgi_turn_variance(&e->settings, i, lanes_load(out->value + TG_OUT_WHEEL_SPEED + i), s->x[0], s->unseen_turn));
     tgi_watch_over(e, row, 0, !open, gap || open, dt, out->value);
     out->event = tgi_event_of(e, row, (gap && !first) || open, 0);
 }

@@ -9,19 +9,25 @@ void tgi_speeds_report(const tg_settings *set, const tgi_speeds *s, tg_real *o)
     const tg_real off = tgi_square(set->ground_speed_delay * s->x[1]) + s->slow; /* of the ground speed alone: the rims are measured by themselves */
     o[TG_OUT_GROUND_SPEED] = known ? s->x[0] : nan;
     o[TG_OUT_GROUND_SPEED_STD] = known ? tgi_root(s->P[0][0] + off) : nan;
-    for (int32_t i = 0; i < set->machine.wheels; i++) {
+    const int32_t n = set->machine.wheels, slips = known && s->open == 0 && s->standing == 0;
+    for (int32_t i = 0; i < n; i += TG_LANES) {
         const int32_t k = 2 + i;
-        const tg_real r = set->rolling_radius[i], hub = tgi_hub_of(s->x[0] - set->wheel_side[i] * s->yaw, set->wheel_ahead[i] * s->yaw);
-        const tg_real omega = (hub + s->x[k]) / r, turn = tgi_turn_variance(set, i, omega, s->x[0], s->unseen_turn);
-        const tg_real vv = s->P[0][0], wv = (vv + s->P[0][k]) / r, ww = (vv + 2 * s->P[0][k] + s->P[k][k]) / (r * r);
+        const tg_lanes r = lanes_load(set->rolling_radius + i), d = lanes_load(s->x + k), vd = lanes_load(s->P[0] + k);
+        const tg_lanes dd = lanes_of(s->P[k][k], s->P[k + 1][k + 1], s->P[k + 2][k + 2], s->P[k + 3][k + 3]);
+        const tg_lanes hub = tgi_hub_of(s->x[0] - lanes_load(set->wheel_side + i) * s->yaw, lanes_load(set->wheel_ahead + i) * s->yaw);
+        const tg_lanes omega = (hub + d) / r, turn = tgi_turn_variance(set, i, omega, s->x[0], s->unseen_turn);
+        const tg_real vv = s->P[0][0];
+        const tg_lanes wv = (vv + vd) / r, ww = (vv + 2 * vd + dd) / (r * r);
         const tgi_slip g = tgi_slip_of(omega, hub, r, set->standstill_speed);
-        const tg_real variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * (vv + off) + turn + tgi_square(g.radius * error);
-        const int32_t slips = known && s->open == 0 && s->standing == 0;
-        o[TG_OUT_WHEEL_SPEED + i] = known ? omega : nan;
-        o[TG_OUT_WHEEL_SPEED_STD + i] = known ? tgi_root(ww) : nan;
-        o[TG_OUT_SLIP + i] = slips ? g.slip : nan;
-        o[TG_OUT_SLIP_STD + i] = slips ? tgi_root(variance < 1 ? variance : 1) : nan;
-        o[TG_OUT_ZERO_SLIP_RADIUS + i] = r;
-        o[TG_OUT_ZERO_SLIP_RADIUS_STD + i] = r * error;
+        const tg_lanes by_radius = g.radius * error;
+        const tg_lanes variance = g.wheel * (g.wheel * ww + 2 * g.ground * wv) + g.ground * g.ground * (vv + off) + turn + by_radius * by_radius;
+        for (int32_t j = 0; j < TG_LANES && i + j < n; j++) {
+            o[TG_OUT_WHEEL_SPEED + i + j] = known ? omega[j] : nan;
+            o[TG_OUT_WHEEL_SPEED_STD + i + j] = known ? tgi_root(ww[j]) : nan;
+            o[TG_OUT_SLIP + i + j] = slips ? g.slip[j] : nan;
+            o[TG_OUT_SLIP_STD + i + j] = slips ? tgi_root(variance[j] < 1 ? variance[j] : 1) : nan;
+            o[TG_OUT_ZERO_SLIP_RADIUS + i + j] = r[j];
+            o[TG_OUT_ZERO_SLIP_RADIUS_STD + i + j] = r[j] * error;
+        }
     }
 }

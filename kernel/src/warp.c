@@ -125,15 +125,18 @@ tgi_slips tgi_driven_slips(const tg_estimator *e)
     const int32_t n = s->machine.wheels, stride = tgi_stride(n);
     const tg_real v = e->belief.x[n + 1], yaw = (tg_real)e->direction * e->yaw_rate, *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
     tgi_slips slips = {{0}, {0}, 0, v > s->standstill_speed};
-    for (int32_t i = 0; i < n; i++) {
-        if (!(e->constants.pulls[i] > 0)) continue;
-        const tg_real ahead = v - s->wheel_side[i] * yaw, hub = tgi_hub_of(ahead, s->wheel_ahead[i] * yaw);
-        const tg_real inverse = 1 / omega[i], part = hub * inverse * e->constants.inverse_radius[i];
-        const tg_real straight = s->wheel_ahead[i] != 0 ? part * v / ahead : v * inverse * e->constants.inverse_radius[i];
-        slips.along[i] = 1 - part;
-        slips.straight[i] = 1 - straight;
-        slips.known &= part > 0 && part < 2 && straight > 0 && straight < 2 && e->wheel[i].count > 0 && e->time - e->wheel[i].time <= (double)s->tuned.silence;
-        slips.variance += tgi_square(straight * inverse) * P[i * (stride + 1)];
+    for (int32_t i = 0; i < n; i += TG_LANES) {
+        const tg_lanes steered = lanes_load(s->wheel_ahead + i), ahead = v - lanes_load(s->wheel_side + i) * yaw, hub = tgi_hub_of(ahead, steered * yaw);
+        const tg_lanes inverse = 1 / lanes_load(omega + i), by_radius = lanes_load(e->constants.inverse_radius + i), part = hub * inverse * by_radius;
+        const tg_lanes straight = lanes_where((tg_choice)(steered != 0), part * v / ahead, v * inverse * by_radius);
+        for (int32_t j = 0; j < TG_LANES && i + j < n; j++) {
+            if (!(e->constants.pulls[i + j] > 0)) continue;
+            const tg_hold *const wheel = &e->wheel[i + j];
+            slips.along[i + j] = 1 - part[j];
+            slips.straight[i + j] = 1 - straight[j];
+            slips.known &= part[j] > 0 && part[j] < 2 && straight[j] > 0 && straight[j] < 2 && wheel->count > 0 && e->time - wheel->time <= (double)s->tuned.silence;
+            slips.variance += tgi_square(straight[j] * inverse[j]) * P[(i + j) * (stride + 1)];
+        }
     }
     slips.variance *= e->constants.share;
     return slips;
@@ -156,7 +159,7 @@ static tg_real usual_slip(const tg_estimator *e, tg_real before)
     const tgi_constants *c = &e->constants;
     const tg_real bend = e->settings.tuned.bend, place = tgi_max(before, e->settings.tuned.least_slip), half = place / c->work * bend / (1 - bend);
     tg_real mean = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) {
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
         const tg_real slip = tgi_max(e->warped.wheel_slip[i], 0);
         mean += c->watched_share[i] * slip / (slip + half);
     }
@@ -175,8 +178,8 @@ static tg_real left_by_spin(const tg_estimator *e)
     const tgi_constants *c = &e->constants;
     const tg_tuned *k = &e->settings.tuned;
     tg_real mean = 0, far = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) mean += c->watched_share[i] * e->warped.wheel_slip[i];
-    for (int i = 0; i < TG_MAX_WHEELS; i++) far = c->watched_share[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.wheel_slip[i] - mean)) : far;
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) mean += c->watched_share[i] * e->warped.wheel_slip[i];
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) far = c->watched_share[i] > 0 ? tgi_max(far, tgi_fabs(e->warped.wheel_slip[i] - mean)) : far;
     return 1 / tgi_square(beyond_line(k, far, c->work / tgi_max(e->warped.slipping, k->least_slip)));
 }
 
@@ -240,7 +243,7 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
     const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
     tg_real lasting = 0, farthest = 0;
-    for (int i = 0; i < TG_MAX_WHEELS; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
     const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * left_by_spin(e);
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
