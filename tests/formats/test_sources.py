@@ -113,6 +113,21 @@ def test_tables_that_start_together_without_a_profile(tmp_path: Path) -> None:
         tg.read([])
 
 
+def test_tables_in_memory_are_sources_too() -> None:
+    """Two DataFrames were 'expected str, bytes or os.PathLike object, not DataFrame'."""
+    wheels = pd.DataFrame({"time": np.arange(100) / 10, "wheel_speed_rl": 5.0})
+    speed = pd.DataFrame({"time": np.arange(20) / 2, "kmh": 3.6})
+    profile = tg.Profile.from_dict(
+        {"time": {"from": "time"}, "channels": {"ground_speed": {"from": "kmh", "unit": "km/h"}}}
+    )
+    recording = tg.read([wheels, speed], [None, profile])
+    np.testing.assert_allclose(recording["ground_speed"][::5], 1.0)
+    assert np.isfinite(recording["ground_speed"]).sum() == len(speed)
+    for wrong in (speed["kmh"], [wheels, 7], None):
+        with pytest.raises(InputError, match="is no log; give a path, a DataFrame or a dict of arrays"):
+            tg.read(wrong)
+
+
 def test_a_file_that_goes_on_where_another_ends_is_refused(tmp_path: Path) -> None:
     """Both have the same channels: the second one's rows would be left out without a word."""
     time = np.arange(0, 100, 0.1)

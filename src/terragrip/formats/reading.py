@@ -26,7 +26,7 @@ PathLike = str | os.PathLike[str]
 
 
 def read(
-    path: PathLike | Sequence[PathLike] | Any,
+    path: PathLike | Sequence[PathLike | Any] | Any,
     profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None = None,
     *,
     dbc: PathLike | Sequence[PathLike] = (),
@@ -40,7 +40,7 @@ def read(
 
     A pandas or polars frame, an Arrow table or a mapping of arrays in place of a path is a log, too.
 
-    Several paths are sources of one drive. Each gives its channels; where several have one, the first source counts.
+    Several paths or tables are sources of one drive. Each gives its channels; where several have one, the first source counts.
     A list of profiles has one for each, None for a source with our names. Clocks are aligned by their stamps where both
     count from 1970, then by the correlation of the speeds, and the notes report by how much.
 
@@ -48,13 +48,21 @@ def read(
     """
     if isinstance(profile, Mapping):
         raise InputError("a dict is no profile", hint="give a path, or tg.Profile.from_dict(...) of it")
-    if isinstance(path, Mapping) or hasattr(path, "columns"):
+    if _is_table(path):
         return _of_frame(path, profile)
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
         from terragrip.formats.sources import merged
 
-        paths = list(path)
+        paths: list[Any] = list(path) if hasattr(path, "__iter__") else [path]
+        for number, one in enumerate(paths, 1):
+            if _is_table(one):
+                columns = columns_of(one, f"table {number}")
+                paths[number - 1] = LogTable(tuple(columns), columns, source=f"table {number}")
+            elif not isinstance(one, str | os.PathLike):
+                raise InputError(
+                    f"{type(one).__name__} is no log", hint="give a path, a DataFrame or a dict of arrays"
+                )
         chosen_ones = _each(profile, paths)
         recording = merged([_part(p, own, databases) for p, own in zip(paths, chosen_ones, strict=True)])
         used = {id(own): own.to_dict() for own in chosen_ones if own is not None}
@@ -65,6 +73,10 @@ def read(
     if chosen is not None:
         return recording_of(read_table(path, chosen.wants, (*databases, *chosen.dbc)), chosen)
     return recording_of(read_table(path, is_own, databases), None)
+
+
+def _is_table(log: Any) -> bool:
+    return isinstance(log, Mapping) or hasattr(log, "columns")
 
 
 def _of_frame(frame: Any, profile: Any) -> Recording:
@@ -142,7 +154,7 @@ def _loaded(profile: Profile | PathLike | None) -> Profile | None:
 
 
 def _each(
-    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None, paths: list[PathLike]
+    profile: Profile | PathLike | Sequence[Profile | PathLike | None] | None, paths: Sequence[Any]
 ) -> list[Profile | None]:
     """The profile of each source."""
     if not paths:
@@ -158,20 +170,20 @@ def _each(
     return result
 
 
-def _part(path: PathLike, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()) -> Part:
+def _part(
+    path: PathLike | LogTable, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()
+) -> Part:
     """The channels of one of several sources; without a profile also columns whose names begin with one of ``also``."""
     from terragrip.formats.conversion import converted
 
+    def table_of(wanted: Wanted, every: Databases) -> LogTable:
+        if isinstance(path, LogTable):
+            return replace(path, columns={name: one for name, one in path.columns.items() if wanted(name)})
+        return read_table(path, wanted, every if format_of(path).takes_databases else ())
+
     if profile is not None:
-        can = format_of(path).takes_databases
-        return converted(
-            profile, read_table(path, profile.wants, (*databases, *profile.dbc) if can else ()), partial=True
-        )
-    table = read_table(
-        path,
-        lambda name: is_own(name) or name.startswith(also),
-        databases if format_of(path).takes_databases else (),
-    )
+        return converted(profile, table_of(profile.wants, (*databases, *profile.dbc)), partial=True)
+    table = table_of(lambda name: is_own(name) or name.startswith(also), databases)
     if TIME not in table.columns:
         raise InputError(
             "is missing",

@@ -31,7 +31,7 @@ def merged(parts: Sequence[Part]) -> Recording:
 
 def joined(
     parts: Sequence[Part],
-) -> tuple[dict[str, Any], str, str, tuple[str, ...], dict[str, float]]:
+) -> tuple[dict[str, Any], str, str | None, tuple[str, ...], dict[str, float]]:
     """Columns, source, digests, notes and noise of what `merged` makes a recording of; none is asked for but time."""
     reference = parts[0]
     signals: dict[str, Signal] = {}
@@ -64,7 +64,7 @@ def joined(
     # The union starts at its first instant: give it back the first source's clock.
     origin = min(float(s.time[0]) for s in signals.values() if len(s.time))
     frame: dict[str, Any] = {**table.columns, TIME: table.columns[TIME] + origin}
-    digests = "+".join(part.sha256 or "" for part in parts)
+    digests = "+".join(part.sha256 or "" for part in parts) if any(p.sha256 for p in parts) else None
     return frame, str(table.source), digests, tuple(dict.fromkeys((*notes, *table.notes))), noise
 
 

@@ -97,6 +97,8 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
     hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
     if near[name] is None:
         hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
+        if name == TIME and source is None:
+            hint = "name the table's column or index of seconds 'time'"
     page = "formats#in-a-profile"
     raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
 
