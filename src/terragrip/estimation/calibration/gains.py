@@ -12,7 +12,7 @@ from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.sharing import SharedGains, Sharing, fit_shared_gains
 from terragrip.estimation.calibration.windows import Windows, track_blocks, wheel_loads, windows
-from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.estimation.calibration.zeros import evidence
 from terragrip.physics.loads import load_levers
 from terragrip.physics.slip import slip
 from terragrip.recording import Recording
@@ -106,9 +106,7 @@ def relative_gains(
         most = float(np.sqrt(moved.diagonal()[: len(driven)].max()))
         if most > _LEAST_PULL_EFFECT:
             unknown.append(Unknown(f"{key}, axle to axle", _NO_PULL.format(100 * most)))
-    rests_on = evidence(
-        table, [Spell(int(k), int(k)) for k in range(len(table))], sources, table.torque_count
-    )
+    rests_on = evidence(table, slice(None), sources, table.torque_count)
     quantities = _quantities(fit, covariance, own, vehicle, driven, rests_on, disagreement, errors.axle_load)
     radius, radius_std = np.ones(len(vehicle.wheels)), np.zeros(len(vehicle.wheels))
     radius[driven] += fit.radius

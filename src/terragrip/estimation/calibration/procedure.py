@@ -122,14 +122,12 @@ def calibrate(
     shared: list[Quantity] = []
     if isinstance(gains, RelativeGains):
         unknown += gains.unknown
-        likely = plausible(_possible(gains.quantities, vehicle, unknown), vehicle, unknown)
-        shared = _useful(likely, vehicle, unknown)
+        shared = _accepted(gains.quantities, vehicle, unknown)
     else:
         unknown += gains
     if isinstance(rolling, Rolling):
         apart = gains if isinstance(gains, RelativeGains) else None
-        found = _radii(rolling, apart, vehicle, determined=bool(shared))
-        quantities += _useful(plausible(found, vehicle, unknown), vehicle, unknown)
+        quantities += _accepted(_radii(rolling, apart, vehicle, determined=bool(shared)), vehicle, unknown)
     quantities += shared
     try:
         quantities.append(identify_torque_scale(_with_gains(corrected, shared), rolled))
@@ -164,12 +162,17 @@ def _zeros(
         zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
     ):
         unknown += missing
-        possible = _possible(zeroed, vehicle, unknown)
-        for key in dict.fromkeys(quantity.key for quantity in possible):
-            quantities += _useful(
-                [quantity for quantity in possible if quantity.key == key], vehicle, unknown
-            )
+        quantities += _accepted(zeroed, vehicle, unknown)
     return quantities, unknown, zeros.yaw_rate_zero(standing, vehicle)
+
+
+def _accepted(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
+    """The quantities that are possible, plausible and news, those of one key together; ``unknown`` says why the others are not."""
+    possible, kept = _possible(quantities, vehicle, unknown), []
+    for key in dict.fromkeys(quantity.key for quantity in possible):
+        own = [quantity for quantity in possible if quantity.key == key]
+        kept += _useful(plausible(own, vehicle, unknown), vehicle, unknown)
+    return kept
 
 
 def _possible(quantities: Sequence[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:

@@ -28,7 +28,7 @@ from terragrip.arrays import Bools, Floats, Ints
 from terragrip.estimation.calibration.result import Evidence, Unknown
 from terragrip.estimation.calibration.sharing import block_covariance, effective_blocks
 from terragrip.estimation.calibration.windows import Windows
-from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.estimation.calibration.zeros import evidence
 from terragrip.physics.loads import GRAVITY
 from terragrip.physics.motion import algebraic_adhesion
 from terragrip.physics.slip import slip
@@ -105,7 +105,7 @@ def rolling_radii(
     radius = vehicle.wheel_radius * scale
     variance = own + _considered(vehicle, typical)
     rolled = slip(windows.wheel_speed[free], windows.hub_speed[free], radius, standstill_speed=0.0)
-    rests_on = evidence(windows, [Spell(int(k), int(k)) for k in np.flatnonzero(free)], sources)
+    rests_on = evidence(windows, free, sources)
     factor = float(stdtrit(max(1.0, stretches - 1), 0.975))
     return Rolling(radius, np.sqrt(variance), factor, float(np.mean(rolled)), rests_on)
 

@@ -62,17 +62,9 @@ class Sharing:
 
     def select(self, rows: Bools) -> Sharing:
         """The windows of a mask (n,)."""
-        return replace(
-            self,
-            torque=self.torque[rows],
-            known=self.known[rows],
-            leverage=self.leverage[rows],
-            slip=self.slip[rows],
-            soil=self.soil[rows],
-            block=self.block[rows],
-            by_delay=None if self.by_delay is None else self.by_delay[rows],
-            by_yaw=None if self.by_yaw is None else self.by_yaw[rows],
-        )
+        names = ("torque", "known", "leverage", "slip", "soil", "block", "by_delay", "by_yaw")
+        by_row = {name: getattr(self, name) for name in names}
+        return replace(self, **{name: value[rows] for name, value in by_row.items() if value is not None})
 
 
 @dataclass(frozen=True)

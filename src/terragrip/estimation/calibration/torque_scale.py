@@ -28,9 +28,9 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.estimation.calibration.plausible import turns_unseen
-from terragrip.estimation.calibration.result import Evidence, Quantity
+from terragrip.estimation.calibration.result import Quantity
 from terragrip.estimation.calibration.windows import Windows, windows
-from terragrip.estimation.calibration.zeros import Spell, evidence
+from terragrip.estimation.calibration.zeros import evidence
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.physics.loads import GRAVITY
 from terragrip.physics.slip import slip
@@ -119,7 +119,9 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         if by_soil > std / 2:
             problem, hint = f"{problem} (soils of unlike resistance would look the same)", _LABEL
         raise InputError(problem, file=logs[0].source, hint=hint)
-    return Quantity("drive_torque_scale", float(scale), std, "1", _evidence(table, logs), sentence)
+    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
+    rests_on = evidence(table, slice(None), sources)
+    return Quantity("drive_torque_scale", float(scale), std, "1", rests_on, sentence)
 
 
 def _fit(rows: _Balance) -> tuple[float, float, Floats, Floats]:
@@ -270,8 +272,3 @@ def _drawbar_gain(table: Windows, vehicle: Vehicle) -> float:
         return 0.0
     stated = vehicle.uncertainty.drawbar_gain
     return _DRAWBAR_GAIN if stated is None else stated
-
-
-def _evidence(table: Windows, logs: Sequence[Recording]) -> tuple[Evidence, ...]:
-    sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
-    return evidence(table, [Spell(k, k) for k in range(len(table))], sources)

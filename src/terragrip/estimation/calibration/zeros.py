@@ -77,25 +77,30 @@ def spells(wanted: Bools, recording: Ints, least: int) -> list[Spell]:
 
 
 def evidence(
-    windows: Windows, stops: Sequence[Spell], sources: Sequence[str], count: Floats | None = None
+    windows: Windows, used: Bools | Ints | slice, sources: Sequence[str], count: Floats | None = None
 ) -> tuple[Evidence, ...]:
-    """One entry per recording: from the first spell's start to the last one's end, with the samples used.
+    """One entry per recording of the windows ``used``: from the first one's start to the last one's end, with the samples used.
 
     ``count`` (n,) samples of the channel that was used; ground speed's by default.
     """
     count = windows.count if count is None else count
-    entries: dict[int, list[Spell]] = {}
-    for spell in stops:
-        entries.setdefault(int(windows.recording[spell.first]), []).append(spell)
+    rows = np.arange(len(windows))[used]
+    logs = windows.recording[rows]
     return tuple(
         Evidence(
             sources[index],
-            float(windows.start[own[0].first]),
-            float(windows.start[own[-1].last] + windows.length),
-            int(sum(count[spell.rows].sum() for spell in own)),
+            float(windows.start[own[0]]),
+            float(windows.start[own[-1]] + windows.length),
+            int(count[own].sum()),
         )
-        for index, own in entries.items()
+        for index in np.unique(logs)
+        for own in [rows[logs == index]]
     )
+
+
+def rows_of(stops: Sequence[Spell]) -> Ints:
+    """The rows of some spells."""
+    return np.asarray(np.r_[tuple(spell.rows for spell in stops)])
 
 
 def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> tuple[float, float]:
@@ -103,14 +108,14 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
 
     ``noise`` is the standard deviation of one of the ``count`` (n,) samples: a few windows may scatter less by chance.
     """
-    inside = [values[spell.rows] for spell in stops]
-    pooled = np.concatenate(inside)
-    pooled = pooled[np.isfinite(pooled)]
+    rows = rows_of(stops)
+    pooled = values[rows][np.isfinite(values[rows])]
     if len(pooled) < 2:
         return float("nan"), float("nan")
-    samples = max(1.0, float(sum(count[spell.rows].sum() for spell in stops)))
+    samples = max(1.0, float(count[rows].sum()))
     within = max(float(np.std(pooled, ddof=1)) / np.sqrt(len(pooled)), noise / np.sqrt(samples))
-    means = np.array([np.nanmean(part) for part in inside if np.isfinite(part).any()])
+    means = np.array([stop_means(values, spell) for spell in stops])
+    means = means[np.isfinite(means)]
     between = float(np.std(means, ddof=1)) / np.sqrt(len(means)) if len(means) > 1 else 0.0
     # Two spells hardly show their scatter: what they do show adds to the scatter within them.
     error = max(within, between) if len(means) > 2 else float(np.hypot(within, between))
@@ -157,7 +162,7 @@ def resting(
 
 
 def stop_means(values: Floats, spell: Spell) -> Floats:
-    """Mean (k,) of values (n, k) over a stop; NaN where a column has no value in it."""
+    """Mean (k,) of values (n, k) over a stop, or of (n,); NaN where a column has no value in it."""
     rows = values[spell.rows]
     known = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
@@ -217,7 +222,7 @@ def torque_zeros(
     for wheel, values in zip(wheels, torque.T, strict=True):
         value, error = spell_mean(values, calm, windows.torque_count, noise)
         sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
-        entry = evidence(windows, calm, sources, windows.torque_count)
+        entry = evidence(windows, rows_of(calm), sources, windows.torque_count)
         quantities.append(
             Quantity(key, value, float(np.hypot(error, level)), "N m", entry, sentence, wheel=wheel)
         )
@@ -274,9 +279,8 @@ def drawbar_zero(
     value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
     if not abs(value) <= allowed:
         return [], [Unknown(key, why)]
-    return [
-        Quantity(key, value, error, "N", evidence(windows, stops, sources, windows.drawbar_count), sentence)
-    ], []
+    entry = evidence(windows, rows_of(stops), sources, windows.drawbar_count)
+    return [Quantity(key, value, error, "N", entry, sentence)], []
 
 
 def _free_passes(windows: Windows, noise: float) -> list[Spell]:
@@ -318,7 +322,8 @@ def inclination_zeros(
     total, error = spell_mean(
         windows.acceleration - GRAVITY * np.sin(slope), stops, windows.acceleration_count, noise
     )
-    stated, rests_on = vehicle.uncertainty, evidence(windows, stops, sources, windows.acceleration_count)
+    stated = vehicle.uncertainty
+    rests_on = evidence(windows, rows_of(stops), sources, windows.acceleration_count)
     # The ground differs from spell to spell, a sensor's zero does not.
     ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(stops))
     other = GRAVITY * (_DEFAULT_PITCH if pitched else ground)
@@ -354,5 +359,4 @@ def yaw_rate_zero(windows: Windows, vehicle: Vehicle) -> tuple[float, float]:
     _, error = spell_mean(windows.yaw_rate, stops, windows.count, 0.0) if stops else (np.nan, np.nan)
     if not np.isfinite(error):
         return 0.0, _UNKNOWN_YAW if np.isfinite(windows.yaw_rate).any() else 0.0
-    rest = np.concatenate([windows.yaw_rate[s.rows] for s in stops])
-    return float(np.nanmean(rest)), error
+    return float(np.nanmean(windows.yaw_rate[rows_of(stops)])), error
