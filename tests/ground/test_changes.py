@@ -19,12 +19,14 @@ from terragrip.errors import InputError
 from terragrip.ground import changes as changes_module
 from terragrip.ground.changes import LEAST, _borders, _Cost, changes_of
 from terragrip.ground.conjugate import Model
-from terragrip.ground.noise import noise_of, usual_noise
-from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
+from terragrip.ground.noise import noise_of
+from terragrip.ground.online_changes import OnlineChanges
 from terragrip.ground.signals import GROUND, curve_scale, signals_of
 from terragrip.ground.steps import A_LENGTH, joined, steps_of
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
+
+USUAL = noise_of(np.zeros((0, 4)), GROUND)
 
 
 def predictive(model: Model, x: np.ndarray) -> np.ndarray:
@@ -42,7 +44,7 @@ def predictive(model: Model, x: np.ndarray) -> np.ndarray:
 @given(st.integers(0, 10_000), st.integers(1, 30))
 @settings(max_examples=30)
 def test_evidence_is_the_product_of_student_predictives(seed, n):
-    model = replace(Model.of(GROUND), weight=np.ones(4))
+    model = replace(Model.of(GROUND, USUAL), weight=np.ones(4))
     x = model.mean + np.random.default_rng(seed).standard_normal((n, 4)) * 0.1
     result = model.evidence(np.full((1, 4), float(n)), x.sum(axis=0)[None], (x**2).sum(axis=0)[None])
     assert result[0] == pytest.approx(predictive(model, x).sum(), rel=1e-9, abs=1e-8)
@@ -55,7 +57,7 @@ def test_the_segmentation_is_the_best_of_all(seed):
     x = np.column_stack([steps, 0.85 + 0 * steps, -5.7 + 0 * steps, -5.1 + 0 * steps]) + rng.standard_normal(
         (24, 4)
     ) * [0.01, 0.08, 0.5, 0.5]
-    cost, price = _Cost(x, replace(Model.of(GROUND), weight=np.ones(4))), 6.0
+    cost, price = _Cost(x, replace(Model.of(GROUND, USUAL), weight=np.ones(4))), 6.0
 
     def total(cuts):
         ends = np.array([0, *cuts, 24])
@@ -105,9 +107,8 @@ def test_standing_still_changes_nothing():
     still = replace(
         estimates, columns={**estimates.columns, "distance": np.minimum(estimates.columns["distance"], 33.0)}
     )
-    settings = OnlineSettings(threshold=0.3, recent=6)
-    assert len(OnlineChanges(settings).update(estimates_blocks(estimates))) == 1
-    assert OnlineChanges(settings).update(estimates_blocks(still)) == []
+    assert len(OnlineChanges().update(estimates_blocks(estimates))) == 1
+    assert OnlineChanges().update(estimates_blocks(still)) == []
 
 
 def plain_probabilities(x: np.ndarray, hazard: float, model: Model) -> np.ndarray:
@@ -125,13 +126,13 @@ def plain_probabilities(x: np.ndarray, hazard: float, model: Model) -> np.ndarra
 def test_the_detector_is_the_plain_recursion(monkeypatch):
     blocks = estimates_blocks(drive(3, [("fine", FINE, 5), ("grass", GRASS, 3)]))
     blocks = blocks[blocks.known]
-    x, model = signals_of(blocks), replace(Model.of(GROUND), weight=np.ones(4))
+    x, model = signals_of(blocks), replace(Model.of(GROUND, USUAL), weight=np.ones(4))
     monkeypatch.setattr("terragrip.ground.online_changes._LEAST", 0.0)
     monkeypatch.setattr(
         "terragrip.ground.online_changes.noise_of",
-        lambda _, names: usual_noise(names)._replace(weight=np.ones(4)),
+        lambda *_: USUAL._replace(weight=np.ones(4)),
     )
-    detector = OnlineChanges(OnlineSettings(length=30))
+    detector = OnlineChanges(length=30)
     detector.update(blocks)
     hazard = -np.expm1(-0.3 / 30)  # 0.3 m a block
     expected = plain_probabilities(x, hazard, model)
@@ -151,11 +152,11 @@ def test_block_by_block_and_with_a_break_it_tells_the_same():
     blocks = estimates_blocks(
         thinned(drive(5, [("grass", GRASS, 30), ("coarse", COARSE, 30)]), 4)
     )  # no roughness
-    settings = OnlineSettings(step=1.0)  # a step of some blocks, of which the break leaves some pending
-    whole = OnlineChanges(settings).update(blocks)
-    first = OnlineChanges(settings)
+    step = 1.0  # m: some blocks, of which the break leaves some pending
+    whole = OnlineChanges(step).update(blocks)
+    first = OnlineChanges(step)
     result = [reported for k in range(50) for reported in first.update(blocks[k : k + 1])]
-    second = OnlineChanges(settings)
+    second = OnlineChanges(step)
     second.restore(json.loads(json.dumps(first.to_dict(), allow_nan=False)))
     result += second.update(blocks[50:])
     assert result == whole
@@ -188,7 +189,7 @@ def test_hard_grounds_that_come_and_go_are_told_apart(scale):
     borders = scale * (24 + 26 * np.arange(6))
     result = changes_of(blocks, step=length / A_LENGTH)
     assert [change.time for change in result] == pytest.approx(borders, abs=2 * scale)
-    live = OnlineChanges(OnlineSettings(step=length / A_LENGTH)).update(blocks)
+    live = OnlineChanges(length / A_LENGTH).update(blocks)
     assert 4 <= len(live) <= 6
     assert all(np.abs(borders - change.time).min() < 3 * scale for change in live)
 
@@ -234,7 +235,7 @@ def test_a_long_drive_on_one_ground_is_searched_a_few_times_over(monkeypatch):
         lambda c, begin, end, p: searched.append(end - begin) or pelt(c, begin, end, p),
     )
     x = np.array([0.12, 0.85, -5.7, -5.1]) + np.random.default_rng(0).standard_normal((600, 4)) * 0.01
-    assert _borders(_Cost(x, Model.of(GROUND)), 8.0) == []
+    assert _borders(_Cost(x, Model.of(GROUND, USUAL)), 8.0) == []
     assert sum(searched) < 3 * len(x)
 
 

@@ -12,7 +12,7 @@ from ground_library import learned
 from terragrip.errors import InputError
 from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.emissions import Emissions
-from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
+from terragrip.ground.recognition import LENGTH, ForwardFilter, by_soil
 from terragrip.ground.unknown import CELLS
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
@@ -35,16 +35,13 @@ def share(timeline, label: str, soil: str) -> float:
 
 
 def test_filter_and_smoother_are_those_of_dense_matrices(library):
-    emissions, chain = Emissions(dict(library)), Chain(length=5.0, unknown=0.2)
+    emissions = Emissions(dict(library))
     blocks = estimates_blocks(drive(1, [("grass", GRASS, 8), ("fine", FINE, 8)]))
-    forward = ForwardFilter.begin(emissions, chain).update(blocks)
-    likelihood, start = (
-        np.exp(emissions.log_likelihood(blocks, np.ones(len(blocks)))),
-        chain.start(emissions.states),
-    )
+    forward = ForwardFilter(emissions).update(blocks)
+    likelihood, start = np.exp(emissions.log_likelihood(blocks, np.ones(len(blocks)))), forward.start
     n = len(start)
     driven = np.diff(blocks.travelled, prepend=blocks.travelled[0])
-    steps = [(s := np.exp(-d / 5.0)) * np.eye(n) + (1 - s) * np.tile(start, (n, 1)) for d in driven]
+    steps = [(s := np.exp(-d / LENGTH)) * np.eye(n) + (1 - s) * np.tile(start, (n, 1)) for d in driven]
     alpha, filtered = start, []
     for step, seen in zip(steps, likelihood, strict=True):
         alpha = (alpha @ step) * seen

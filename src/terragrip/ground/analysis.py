@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +13,8 @@ from terragrip.estimation import Estimates
 from terragrip.ground.changes import LENGTH, Change, changes_of
 from terragrip.ground.emissions import Emissions
 from terragrip.ground.events import events
-from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
-from terragrip.ground.recognition import Chain, ForwardFilter, by_soil
+from terragrip.ground.online_changes import OnlineChanges
+from terragrip.ground.recognition import ForwardFilter, by_soil
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Stretch, sections_of
 from terragrip.ground.signals import GROUND
@@ -33,12 +33,11 @@ SURE = 0.5
 @dataclass(frozen=True)
 class Settings:
     """Settings of the analysis. `online`: the results while driving (no future samples); `length` [m]: prior mean distance on one
-    ground, for changes; `chain`: the prior of the soils; `signals`: the signals in which changes are detected."""
+    ground, for changes; `signals`: the signals in which changes are detected."""
 
     online: bool = False
     length: float = LENGTH
     signals: tuple[str, ...] = GROUND
-    chain: Chain = field(default_factory=Chain)
 
 
 def analyse(
@@ -54,7 +53,7 @@ def analyse(
     length = whole_length(estimates.vehicle)
     changes = _changes(blocks, chosen, length / A_LENGTH)
     emissions = Emissions(library.recognisable if library is not None else {}, maker(estimates), length)
-    forward = ForwardFilter.begin(emissions, chosen.chain).update(blocks)
+    forward = ForwardFilter(emissions).update(blocks)
     probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
     timeline = Timeline(
         blocks.start, emissions.names, probabilities, blocks.known, block_labels(estimates, blocks)
@@ -114,8 +113,7 @@ def _soils(timeline: Timeline) -> tuple[str, ...]:
 def _changes(blocks: Blocks, settings: Settings, step: float) -> tuple[Change, ...]:
     if not settings.online:
         return changes_of(blocks, settings.signals, settings.length, step)
-    online = OnlineChanges(OnlineSettings(length=settings.length, names=settings.signals, step=step))
-    return tuple(online.update(blocks))
+    return tuple(OnlineChanges(step, settings.length, settings.signals).update(blocks))
 
 
 def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeline) -> list[Stretch]:

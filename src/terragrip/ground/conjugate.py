@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from terragrip.arrays import Floats
-from terragrip.ground.noise import Noise, usual_noise
+from terragrip.ground.noise import Noise
 from terragrip.ground.signals import LAWS
 
 SHAPE = 8.0
@@ -31,10 +31,9 @@ class Model:
     weight: Floats
 
     @classmethod
-    def of(cls, names: Sequence[str], noise: Noise | None = None) -> Model:
-        """The model of signals by name; `noise` where it was measured on the drive itself."""
-        laws = [LAWS[name] for name in names]
-        within, weight = noise or usual_noise(names)
+    def of(cls, names: Sequence[str], noise: Noise) -> Model:
+        """The model of signals by name, with their `noise` on one ground."""
+        laws, (within, weight) = [LAWS[name] for name in names], noise
         return cls(
             mean=np.array([law.mean for law in laws]),
             count=(within / np.array([law.sd for law in laws])) ** 2,

@@ -15,7 +15,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.ground.changes import Change
 from terragrip.ground.emissions import Emissions
-from terragrip.ground.online_changes import OnlineChanges, OnlineSettings
+from terragrip.ground.online_changes import OnlineChanges
 from terragrip.ground.recognition import ForwardFilter, by_soil
 from terragrip.ground.steps import A_LENGTH
 from terragrip.soil.blocks import PERIOD, Blocks, blocks_of, driven_wheels, needed_columns
@@ -76,8 +76,8 @@ class LiveGround:
         self._emissions = Emissions(
             library.recognisable if library is not None else {}, estimator.method, length
         )
-        self._filter = ForwardFilter.begin(self._emissions)
-        self._changes = OnlineChanges(OnlineSettings(step=length / A_LENGTH))
+        self._filter = ForwardFilter(self._emissions)
+        self._changes = OnlineChanges(length / A_LENGTH)
         self._origin: float | None = None
         self._number = 0
         self._before: tuple[int, int] | None = None

@@ -30,14 +30,8 @@ class Noise(NamedTuple):
     weight: Floats
 
 
-def usual_noise(names: Sequence[str]) -> Noise:
-    """Before a drive: the ground's variation alone."""
-    within = np.array([LAWS[name].within for name in names])
-    return Noise(within, np.full(len(names), 1 / _REPEATS))
-
-
 def noise_of(signals: Floats, names: Sequence[str]) -> Noise:
-    """The noise of a drive's signals (steps, signals), NaN where not measured."""
+    """The noise of a drive's signals (steps, signals), NaN where not measured; of few steps the usual variation of the ground alone."""
     usual = [LAWS[name].within for name in names]
     return Noise(
         *np.array([_measured(x[np.isfinite(x)], sd) for x, sd in zip(signals.T, usual, strict=True)]).T

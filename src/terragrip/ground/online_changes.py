@@ -7,7 +7,6 @@ changes nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from terragrip.arrays import Floats
-from terragrip.ground.changes import Change
+from terragrip.ground.changes import LENGTH, Change
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
@@ -25,28 +24,21 @@ from terragrip.soil.blocks import Blocks
 _MOST = 240
 """Run lengths kept, and steps that the noise is measured on: 40 lengths of the vehicle."""
 _LEAST = 1e-7
+_THRESHOLD = 0.8  # probability at which a change is reported,
+_RECENT = 2 * A_LENGTH  # within so many steps
 _RUNS = ("_mean", "_count", "_shape", "_scale")
 _EACH = ("_probability", "_age")
 
 
-@dataclass(frozen=True)
-class OnlineSettings:
-    """`length` [m]: mean distance on one ground; `threshold`: probability at which a change is reported; `recent`: steps searched;
-    `step` [m]: way that blocks are put together over, 0: none (`steps.steps_of`)."""
-
-    length: float = 30.0
-    threshold: float = 0.8
-    recent: int = 2 * A_LENGTH
-    names: tuple[str, ...] = GROUND
-    step: float = 0.0
-
-
 class OnlineChanges:
-    """Receives blocks in order and reports changes; `probability` is that of a change within the last `recent` steps."""
+    """Receives blocks in order and reports changes; `probability` is that of a change within the last steps.
 
-    def __init__(self, settings: OnlineSettings | None = None) -> None:
-        self.settings = settings or OnlineSettings()
-        self._signals = np.zeros((0, len(self.settings.names)))
+    `step`, `length` [m] and `names` as of `changes.changes_of`.
+    """
+
+    def __init__(self, step: float = 0.0, length: float = LENGTH, names: tuple[str, ...] = GROUND) -> None:
+        self._step, self._length, self._names = step, length, names
+        self._signals = np.zeros((0, len(names)))
         self._prior()
         self._mean, self._count, self._shape, self._scale = (x[None, :].copy() for x in self._fresh)
         self._probability = np.ones(1)
@@ -61,10 +53,10 @@ class OnlineChanges:
     def update(self, blocks: Blocks) -> list[Change]:
         """Add blocks, one or many; returns the changes that they show."""
         every = blocks if self._pending is None else joined(self._pending, blocks)
-        steps, rest, self._from = steps_of(every, self.settings.step, self._from)
+        steps, rest, self._from = steps_of(every, self._step, self._from)
         self._pending = rest if len(rest) else None
         result = []
-        signals = signals_of(steps, self.settings.names)
+        signals = signals_of(steps, self._names)
         for k in range(len(steps)):
             change = self._add(
                 signals[k], float(steps.start[k]), float(steps.end[k]), float(steps.travelled[k])
@@ -91,7 +83,7 @@ class OnlineChanges:
         """Take the state of `to_dict`; raises KeyError, TypeError or ValueError where it is none."""
         for name in (*_RUNS, *_EACH, "_begin"):
             setattr(self, name, np.array(state[name], dtype=float))
-        self._signals = np.array(state["signals"], dtype=float).reshape(-1, len(self.settings.names))
+        self._signals = np.array(state["signals"], dtype=float).reshape(-1, len(self._names))
         self._prior()
         self._travelled, self.probability = state["travelled"], float(state["probability"])
         self._quiet, self._from = int(state["quiet"]), state["from"]
@@ -103,13 +95,13 @@ class OnlineChanges:
 
     def _prior(self) -> None:
         """The law of a new ground, by the noise of the steps so far."""
-        model = Model.of(self.settings.names, noise_of(self._signals, self.settings.names))
+        model = Model.of(self._names, noise_of(self._signals, self._names))
         self._weight, self._fresh = model.weight, (model.mean, model.count, model.shape, model.scale)
 
     def _add(self, x: Floats, start: float, end: float, travelled: float) -> Change | None:
         driven = 0.0 if self._travelled is None else max(travelled - self._travelled, 0.0)
         self._travelled = travelled
-        hazard = -np.expm1(-driven / self.settings.length)
+        hazard = -np.expm1(-driven / self._length)
         grown = self._probability * (1 - hazard)
         self._probability = np.append(grown, hazard)
         self._begin = np.append(self._begin, start)
@@ -151,9 +143,9 @@ class OnlineChanges:
 
     def _report(self, now: float) -> Change | None:
         self._quiet += 1
-        recent = self._age <= min(self.settings.recent, self._quiet - 1)
+        recent = self._age <= min(_RECENT, self._quiet - 1)
         self.probability = float(self._probability[recent].sum())
-        if self.probability < self.settings.threshold:
+        if self.probability < _THRESHOLD:
             return None
         weight, at = self._probability[recent] / self.probability, self._begin[recent]
         time = float((weight * at).sum())

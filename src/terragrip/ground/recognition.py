@@ -14,36 +14,28 @@ from terragrip.arrays import Floats
 from terragrip.ground.emissions import Emissions
 from terragrip.soil.blocks import Blocks
 
-
-@dataclass(frozen=True)
-class Chain:
-    """The prior: mean length of one soil [m], and the share of unknown soils among the new ones."""
-
-    length: float = 8.0
-    unknown: float = 0.15
-
-    def start(self, states: NDArray[np.int64]) -> Floats:
-        """Prior probabilities (states,): known soils equally likely, states of one soil equally likely. `states`: of `Emissions`."""
-        soils = int(states[-1])
-        unknown = self.unknown if soils else 1.0
-        each = np.append(np.full(soils, (1 - unknown) / max(soils, 1)), unknown)
-        return np.asarray((each / np.bincount(states))[states])
+LENGTH = 8.0
+"""Mean length of one soil [m], beforehand,"""
+UNKNOWN_SHARE = 0.15
+"""and the share of unknown soils among the new ones."""
 
 
-@dataclass
+def prior(states: NDArray[np.int64]) -> Floats:
+    """Prior probabilities (states,): known soils equally likely, states of one soil equally likely. `states`: of `Emissions`."""
+    soils = int(states[-1])
+    unknown = UNKNOWN_SHARE if soils else 1.0
+    each = np.append(np.full(soils, (1 - unknown) / max(soils, 1)), unknown)
+    return np.asarray((each / np.bincount(states))[states])
+
+
 class ForwardFilter:
     """Probabilities of the states of `emissions` up to now; one block at a time."""
 
-    emissions: Emissions
-    chain: Chain
-    probabilities: Floats
-    travelled: float | None = None
-
-    @classmethod
-    def begin(cls, emissions: Emissions, chain: Chain | None = None) -> ForwardFilter:
-        """Before the first block."""
-        prior = chain or Chain()
-        return cls(emissions, prior, prior.start(emissions.states))
+    def __init__(self, emissions: Emissions) -> None:
+        self.emissions = emissions
+        self.start = prior(emissions.states)
+        self.probabilities = self.start
+        self.travelled: float | None = None
 
     def update(self, blocks: Blocks) -> Forward:
         """Take blocks in order, one or many: the results are the same."""
@@ -51,30 +43,24 @@ class ForwardFilter:
         driven = np.diff(np.concatenate((before, blocks.travelled))).clip(0)
         logs = self.emissions.log_likelihood(blocks, driven)
         weight = np.exp(logs - logs.max(axis=1, keepdims=True)) if len(logs) else logs
-        start, filtered, anew = (
-            self.chain.start(self.emissions.states),
-            np.empty_like(logs),
-            np.zeros(len(logs)),
-        )
+        filtered, anew = np.empty_like(logs), -np.expm1(-driven / LENGTH)
         for k, travelled in enumerate(blocks.travelled):
-            anew[k] = -np.expm1(-driven[k] / self.chain.length)
-            moved = ((1 - anew[k]) * self.probabilities + anew[k] * start) * weight[k]
+            moved = ((1 - anew[k]) * self.probabilities + anew[k] * self.start) * weight[k]
             self.probabilities = moved / moved.sum()
             self.travelled = float(travelled)
             filtered[k] = self.probabilities
-        return Forward(filtered, weight, anew, start, self.emissions.states)
+        return Forward(filtered, weight, anew, self.start)
 
 
 @dataclass(frozen=True)
 class Forward:
     """A forward pass: filtered probabilities and relative likelihoods (blocks, states), the chance of a new soil before each block
-    (blocks,), the law that it is drawn from and the soil of each state (states,)."""
+    (blocks,), and the law (states,) that it is drawn from."""
 
     filtered: Floats
     weight: Floats
     anew: Floats
     start: Floats
-    states: NDArray[np.int64]
 
     def smoothed(self) -> Floats:
         """Probabilities given the whole drive, (blocks, states): the backward pass of Rabiner 1989, scaled."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terragrip.arrays import Floats, Ints
+from terragrip.arrays import Floats
 from terragrip.estimation import Estimates
 from terragrip.ground.span import Span
 from terragrip.soil.blocks import driven_wheels, wheel_loads
@@ -110,41 +110,34 @@ class _Values:
         """The section of a stretch that counts from row `begin` on."""
         rows = slice(begin, stretch.last)
         counts = begin + np.flatnonzero(self.counts[rows])
-        wheels = {
-            w: dict(
-                zip(
-                    ("slip_mean", "slip_std", "adhesion_mean", "adhesion_std"),
-                    (*_moments(self.slip[w], counts), *_moments(self.adhesion[w], counts)),
-                    strict=True,
-                )
-            )
-            for w in self.slip
-        }
-        measured = {
-            w: dict(zip(("force_ratio_mean", "force_ratio_std"), _moments(ratio, counts), strict=True))
-            for w, ratio in self.force.items()
-            if np.isfinite(ratio[counts]).any()
-        }
         return Section(
-            float(self.time[begin]),
-            float(self.time[stretch.last - 1]),
-            float(self.time[stretch.first]),
-            stretch.soil,
-            stretch.probabilities,
-            counts.size,
-            *_moments(self.mean_slip, counts),
-            *_moments(self.mean_adhesion, counts),
-            *_moments(self.resistance, counts),
-            wheels,
-            measured,
-            "" if self.labels is None else _commonest(self.labels[rows]),
+            start=float(self.time[begin]),
+            end=float(self.time[stretch.last - 1]),
+            entered=float(self.time[stretch.first]),
+            soil=stretch.soil,
+            probabilities=stretch.probabilities,
+            samples=counts.size,
+            **_moments("slip", self.mean_slip[counts]),
+            **_moments("adhesion", self.mean_adhesion[counts]),
+            **_moments("resistance", self.resistance[counts]),
+            wheels={
+                w: _moments("slip", self.slip[w][counts]) | _moments("adhesion", self.adhesion[w][counts])
+                for w in self.slip
+            },
+            measured={
+                w: _moments("force_ratio", ratio[counts])
+                for w, ratio in self.force.items()
+                if np.isfinite(ratio[counts]).any()
+            },
+            label="" if self.labels is None else _commonest(self.labels[rows]),
         )
 
 
-def _moments(values: Floats, rows: Ints) -> tuple[float | None, float | None]:
-    chosen = values[rows]
-    chosen = chosen[np.isfinite(chosen)]
-    return (float(chosen.mean()), float(chosen.std())) if chosen.size else (None, None)
+def _moments(name: str, values: Floats) -> dict[str, float | None]:
+    """Mean and SD of a quantity, by their names."""
+    known = values[np.isfinite(values)]
+    mean, std = (float(known.mean()), float(known.std())) if known.size else (None, None)
+    return {f"{name}_mean": mean, f"{name}_std": std}
 
 
 def _ratio(force: Floats, load: Floats) -> Floats:
