@@ -19,7 +19,7 @@ from terragrip.estimation.converting import convert
 from terragrip.estimation.driveline import DrivenMachine
 from terragrip.estimation.engine import EVENTS, refusal
 from terragrip.estimation.engine_torque import EngineTorque
-from terragrip.estimation.export.limits import SHEET_ROWS
+from terragrip.estimation.export import SHEET_ROWS
 from terragrip.estimation.export.rows_as_json import json_rows
 from terragrip.estimation.forward import flag_before_gaps, table_of
 from terragrip.estimation.provenance import about_recording

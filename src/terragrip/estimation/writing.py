@@ -25,12 +25,14 @@ def write_parts(parts: Iterable[Estimates], path: str | os.PathLike[str]) -> Non
     require_suffix(path)
     writer: TableWriter | None = None
     pending: Future[None] | None = None
+    rows = 0
     with replacing(path) as temporary:
         try:
             with ThreadPoolExecutor(1) as pool:
                 for part in parts:
+                    rows += len(part)
+                    require_room(path, rows, part.names)
                     if writer is None:
-                        require_room(path, len(part), part.names)
                         writer = writer_of(temporary, part, Path(path))
                     if pending is not None:
                         pending.result()

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.arrays import Floats
-from terragrip.errors import InputError, missing_package
+from terragrip.errors import missing_package
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
-from terragrip.ground.signals import GROUND, SIGNALS, signals_of
+from terragrip.ground.signals import GROUND, signals_of
 from terragrip.ground.steps import steps_of
 from terragrip.soil.blocks import Blocks
 
@@ -64,13 +64,10 @@ def changes_of(
 ) -> tuple[Change, ...]:
     """The changes of a whole drive.
 
-    `names`: which of `SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak, which with
+    `names`: which of `signals.SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak, which with
     the drive's own speed is the price of a change. `step` [m]: way that blocks are put together over (`steps.A_LENGTH` of the vehicle's
     length); 0: none. Raises InputError where ruptures is not installed.
     """
-    for name in names:
-        if name not in SIGNALS:
-            raise InputError(f"there is no signal {name!r}", hint=f"choose one of {', '.join(SIGNALS)}")
     steps, _, _ = steps_of(blocks, step)
     every = signals_of(steps, tuple(names))
     is_measured = np.isfinite(every).any(axis=1)

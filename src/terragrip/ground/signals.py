@@ -11,17 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.errors import InputError
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import FLOOR, LARGEST_SLIP, Blocks
 from terragrip.soil.signature import USUAL_CURVE
 
 GROUND = ("soil_resistance", "curve_scale", "soil_resistance_sd", "adhesion_sd")
 """The signals that depend on the ground only. `_sd`: ln of the SD within a block."""
-SIGNALS = (
-    *GROUND, "slip", "adhesion", "curve_a", "slip_sd", "soil_resistance_std", "adhesion_std", "slip_std",
-)  # fmt: skip
-"""All signals on offer. `curve_a`: the kernel's curve while driving, which lags by seconds; `_std`: ln of the estimates' own SD."""
-
 _SCALE, _SCALE_SD, _ADHESION_SD = USUAL_CURVE["a"], 0.5, 0.03
 """Before any mu is known a is 0.85 +- 0.5, as the kernel's curve has it; a block's mu scatters by 0.03 about its curve."""
 _SHOWN = 0.25
@@ -56,12 +52,14 @@ LAWS: dict[str, Law] = {
     "adhesion_std": Law(-4.8, 0.5, 0.2),
     "slip_std": Law(-3.6, 0.5, 0.2),
 }
+SIGNALS = tuple(LAWS)
+"""All signals on offer. `curve_a`: the kernel's curve while driving, which lags by seconds; `_std`: ln of the estimates' own SD."""
 
 
 def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     """Signals (blocks, names); NaN where a block shows nothing, or its slip is known to no better than 30 %.
 
-    Raises ValueError on a name that is none of `SIGNALS`.
+    Raises InputError on a name that is none of `SIGNALS`.
     """
     slip, adhesion = blocks.mean_slip, blocks.mean_adhesion
     every = {
@@ -79,7 +77,7 @@ def signals_of(blocks: Blocks, names: tuple[str, ...] = GROUND) -> Floats:
     }
     for name in names:
         if name not in every:
-            raise ValueError(f"there is no signal {name!r}; there are {', '.join(SIGNALS)}")
+            raise InputError(f"there is no signal {name!r}", hint=f"choose one of {', '.join(SIGNALS)}")
     creeps = 2 * np.sqrt(blocks.slip_variance.mean(axis=1)) > LARGEST_SLIP  # as just before a standstill
     shown = blocks.known & ~creeps
     out = np.column_stack([every[name] for name in names])

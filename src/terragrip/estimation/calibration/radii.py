@@ -170,11 +170,11 @@ def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
         if len(windows) > 1
         else np.zeros(len(windows))
     )
-    left, right = [
-        np.array([k for k in range(len(vehicle.wheels)) if _side(vehicle, k) == s], int) for s in (1, -1)
-    ]
+    # By the wheels' places in their axles' lists: a track may not be known.
+    places = [np.arange(count) for count in np.bincount(vehicle.wheel_axle)]
+    left, right = (np.concatenate([s * (own[::-1] - own) > 0 for own in places]) for s in (1, -1))
     straight = np.ones(len(windows), dtype=bool)
-    if len(left) and len(right):
+    if left.any() and right.any():
         speed = rim.mean(axis=1)
         apart = np.abs(rim[:, left].mean(axis=1) - rim[:, right].mean(axis=1))
         turning = np.ptp(windows.hub_speed, axis=1)
@@ -184,13 +184,6 @@ def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
     whole = windows.count > 0.5 * np.median(windows.count[windows.count > 0])
     moving = (windows.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
     return whole & moving & straight & (change < _STEADY * GRAVITY)
-
-
-def _side(vehicle: Vehicle, wheel: int) -> int:
-    """1 left, -1 right, 0 in the middle, by the place in its axle's list."""
-    own = np.flatnonzero(vehicle.wheel_axle == vehicle.wheel_axle[wheel])
-    place = int(np.searchsorted(own, wheel))
-    return int(np.sign(len(own) - 1 - 2 * place))
 
 
 def _most(adhesion: Floats) -> float:

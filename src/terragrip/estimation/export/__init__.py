@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from terragrip.errors import InputError, missing_package
-from terragrip.estimation.export import limits
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -49,12 +48,16 @@ class FileKind:
     most: Callable[[Collection[str]], int] | None = None
 
 
+SHEET_ROWS = 1_048_576
+"""Of an Excel sheet, its header included (Excel specifications and limits, Microsoft)."""
+_STRUCT_BYTES = (1 << 31) - (1 << 20)
+"""Of a variable of a MATLAB file of version 5 and 7: 2 GB (MAT-File Versions, MathWorks), less the size of the fields' tags."""
 _PLACE = ("latitude", "longitude")
 KINDS: dict[str, FileKind] = {
     ".parquet": FileKind("Parquet", ("arrow_files", "ParquetFile")),
     ".csv": FileKind("CSV", ("arrow_files", "CsvFile")),
-    ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=lambda names: limits.SHEET_ROWS - 1),
-    ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=lambda names: limits.struct_rows(names)),
+    ".xlsx": FileKind("an Excel sheet", ("spreadsheet", "Spreadsheet"), "xlsxwriter", "formats", most=lambda names: SHEET_ROWS - 1),
+    ".mat": FileKind("a MATLAB file", ("matlab", "MatFile"), most=lambda names: _STRUCT_BYTES // (8 * len(names))),
     ".geojson": FileKind("GeoJSON", ("places", "GeoJson"), needs=_PLACE),
     ".gpkg": FileKind("a GeoPackage", ("places", "GeoPackage"), "pyogrio", "geo", needs=_PLACE),
     ".mcap": FileKind("MCAP", ("foxglove", "McapFile"), "mcap", "formats"),

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terragrip.errors import InputError
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.export.about import about_texts
-from terragrip.estimation.export.limits import struct_rows
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -26,19 +24,12 @@ class MatFile:
     """
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
-        self._path, self._target, self._first, self._rows = path, target, first, 0
+        self._path, self._first = path, first
         self._parts: dict[str, list[Any]] = {name: [] for name in first.names}
         self._texts: dict[str, dict[str, int]] = {name: {} for name in ("event", *first.labels)}
 
     def write(self, part: Estimates) -> None:
         """Keep the rows of a part: a struct is written whole."""
-        self._rows += len(part)
-        most = struct_rows(self._first.names)
-        if self._rows > most:
-            raise InputError(
-                f"a MATLAB file holds at most {most} rows",
-                file=self._target, hint="write .parquet (parquetread), or give a shorter part of the log",
-            )  # fmt: skip
         for name, parts in self._parts.items():
             parts.append(self._coded(name, part) if name in self._texts else part[name])
 

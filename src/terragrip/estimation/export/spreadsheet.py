@@ -6,10 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terragrip.errors import InputError
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.export.about import about_rows
-from terragrip.estimation.export.limits import SHEET_ROWS
 from terragrip.recording.clock import clock_times
 
 if TYPE_CHECKING:
@@ -29,7 +27,7 @@ class Spreadsheet:
         self._bold = self._book.add_format({"bold": True})
         self._date = self._book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
         self._sheet = self._book.add_worksheet("estimates")
-        self._names, self._target, self._row = first.names, target, 1
+        self._names, self._row = first.names, 1
         self._has_clock = first.start is not None
         heads = [self._names[0], *([CLOCK] if self._has_clock else []), *self._names[1:]]
         self._sheet.freeze_panes(1, 1 + self._has_clock)
@@ -51,11 +49,6 @@ class Spreadsheet:
 
     def write(self, part: Estimates) -> None:
         """Write the rows of a part."""
-        if self._row + len(part) > SHEET_ROWS:
-            raise InputError(
-                f"an Excel sheet holds at most {SHEET_ROWS - 1} rows",
-                file=self._target, hint="write .parquet, or give a shorter part of the log",
-            )  # fmt: skip
         columns: list[Any] = [part[name].tolist() for name in self._names]
         clock = clock_times(part.time, part.start).tolist() if part.start is not None else None
         sheet, row, place = self._sheet, self._row, 1 + self._has_clock

@@ -70,12 +70,12 @@ def features_of(signals: Signals, starts: Floats, layout: Layout) -> Table:
     with np.errstate(invalid="ignore", divide="ignore"):
         speeds = _wheels(usable.get(SPEED, {}), starts, layout, SPEED)
         if speeds is not None:
-            result |= _named(SPEED, motion(speeds[0], layout.size[SPEED]))
-            result |= _each(SPEED, usable[SPEED], speeds[0], layout)
+            result |= _named(SPEED, motion(speeds, layout.size[SPEED]))
+            result |= _each(SPEED, usable[SPEED], speeds, layout)
         torques = _wheels(usable.get(TORQUE, {}), starts, layout, TORQUE)
         if torques is not None:
-            result |= _named(TORQUE, effort_of(torques[0], layout.size[TORQUE]))
-            result |= _each(TORQUE, usable[TORQUE], torques[0], layout)
+            result |= _named(TORQUE, effort_of(torques, layout.size[TORQUE]))
+            result |= _each(TORQUE, usable[TORQUE], torques, layout)
             if speeds is not None:
                 beside = _drive_beside_motion(usable, starts, layout, torques)
                 result |= _named(f"{SPEED}+{TORQUE}", beside)
@@ -130,35 +130,33 @@ def dense(family: str, channels: dict[str, Channel], layout: Layout) -> bool:
 
 
 def _stack(
-    channels: dict[str, Channel], starts: Floats, layout: Layout, period: float, lead: Channel
+    channels: dict[str, Channel],
+    starts: Floats,
+    layout: Layout,
+    period: float,
+    beside: dict[str, Channel] | None = None,
 ) -> Floats:
-    """Samples (windows, channels, samples) on one grid."""
+    """Samples (windows, channels, samples) on one grid: of the densest channel, the first of equals, of these or those ``beside``."""
+    lead = max((beside or channels).values(), key=lambda channel: len(channel.time))
     return samples_in(list(channels.values()), starts, layout.window, period, lead)
 
 
-def _lead(channels: dict[str, Channel]) -> Channel:
-    """The channel that sets the grid: the densest, the first of equals."""
-    return max(channels.values(), key=lambda channel: len(channel.time))
-
-
-def _wheels(
-    channels: dict[str, Channel], starts: Floats, layout: Layout, family: str
-) -> tuple[Floats, float] | None:
-    """Samples (windows, wheels, samples) and their period, or None if no channel holds at least two a window."""
+def _wheels(channels: dict[str, Channel], starts: Floats, layout: Layout, family: str) -> Floats | None:
+    """Samples (windows, wheels, samples), or None if no channel holds at least two a window."""
     if not channels:
         return None
     period = _period(family, channels, layout)
     if period > layout.window / 2:
         return None
-    return _stack(channels, starts, layout, period, _lead(channels)), period
+    return _stack(channels, starts, layout, period)
 
 
 def _drive_beside_motion(
-    usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, torques: tuple[Floats, float]
+    usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, torque: Floats
 ) -> Table:
     """Torque and speed together: power, signed effort, and whether they rise and fall as one."""
-    torque, period = torques
-    speed = _stack(usable[SPEED], starts, layout, period, _lead(usable[TORQUE]))
+    period = _period(TORQUE, usable[TORQUE], layout)
+    speed = _stack(usable[SPEED], starts, layout, period, usable[TORQUE])
     effort, pace = over_wheels(np.abs(torque))[0], over_wheels(np.abs(speed))[0]
     net = over_wheels(speed)[0]
     size = layout.size[TORQUE] * layout.size[SPEED]
@@ -189,13 +187,13 @@ def _ground(
     usable: dict[str, dict[str, Channel]],
     starts: Floats,
     layout: Layout,
-    speeds: tuple[Floats, float] | None,
+    speeds: Floats | None,
 ) -> Table:
     """Ground speed: its own evenness, and how much faster the wheels turn than the vehicle moves (slip)."""
     channels = usable[GROUND]
     period = _period(GROUND, channels, layout)
     size = layout.size[GROUND]
-    moving = _stack(channels, starts, layout, period, channels["ground_speed"])[:, 0]
+    moving = _stack(channels, starts, layout, period)[:, 0]
     level = np.abs(moving).mean(axis=-1)
     result = _named(
         GROUND,
@@ -205,7 +203,7 @@ def _ground(
         },
     )
     if speeds is not None:
-        pace = over_wheels(np.abs(speeds[0]))[0].mean(axis=-1)
+        pace = over_wheels(np.abs(speeds))[0].mean(axis=-1)
         slip = log_size(pace, layout.size[SPEED]) - log_size(level, size)
         result[f"{SPEED}+{GROUND}: slip"] = slip
     return result
@@ -216,7 +214,7 @@ def _body(family: str, channels: dict[str, Channel], starts: Floats, layout: Lay
     period = _period(family, channels, layout)
     edges = band_edges(layout.window, layout.period[family])
     size = layout.size[family]
-    values = _stack(channels, starts, layout, period, _lead(channels))
+    values = _stack(channels, starts, layout, period)
     axes = [name.rpartition("_")[2] for name in channels]
     result: Table = {}
     each = moments(values)
@@ -255,18 +253,15 @@ def _octaves(energies: Floats) -> list[Floats]:
     return result
 
 
-def _yaw(
-    usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, speeds: tuple[Floats, float]
-) -> Table:
+def _yaw(usable: dict[str, dict[str, Channel]], starts: Floats, layout: Layout, speeds: Floats) -> Table:
     """How much the body turns relative to what the wheels command: low on ground that lets a skid-steered vehicle slide."""
     channels = usable[TURN]
     if "angular_velocity_z" not in channels:
         return {}
     about_z = {"angular_velocity_z": channels["angular_velocity_z"]}
     period = _period(TURN, channels, layout)
-    turning = _stack(about_z, starts, layout, period, about_z["angular_velocity_z"])[:, 0]
-    wheel = speeds[0]
-    _, most, least = over_wheels(wheel)
+    turning = _stack(about_z, starts, layout, period)[:, 0]
+    _, most, least = over_wheels(speeds)
     parting = (most - least).mean(axis=-1) / (2 * layout.size[SPEED])
     rate = np.abs(turning.mean(axis=-1)) / layout.size[TURN]
     return {

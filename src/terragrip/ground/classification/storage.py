@@ -110,13 +110,11 @@ def load(path: str | os.PathLike[str], make: Callable[[Mapping[str, Any], Learnt
                 raise ValueError(error) from error
     except InputError:
         raise
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError) as error:
-        if content[:2] == b"PK":
-            raise _damaged(path, error) from error
-        raise _foreign(path) from error
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError, SyntaxError, OverflowError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError,
+            AttributeError, LookupError, TypeError, ValueError, SyntaxError, OverflowError) as error:  # fmt: skip
         if content[:2] == b"PK" and b"header.npy" in content:
-            raise _damaged(path, error) from error
+            hint = "copy it again, or train it again"
+            raise InputError(f"is damaged ({error})", file=path, hint=hint) from error
         raise _foreign(path) from error
 
 
@@ -218,7 +216,3 @@ def _foreign(path: str | os.PathLike[str]) -> InputError:
     return InputError(
         "is not a ground classifier", file=path, hint="name a file that GroundClassifier.save wrote"
     )
-
-
-def _damaged(path: str | os.PathLike[str], error: Exception) -> InputError:
-    return InputError(f"is damaged ({error})", file=path, hint="copy it again, or train it again")
