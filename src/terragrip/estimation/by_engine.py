@@ -13,6 +13,7 @@ from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.survey import joined
 from terragrip.recording.vehicle_sizes import size_warnings
 from terragrip.vehicle import Vehicle
 
@@ -39,7 +40,7 @@ class ByEngine:
             self._waiting.clear()
             tail = None
             for block in log.blocks():
-                whole = block if tail is None else _behind(tail, block)
+                whole = block if tail is None else joined([tail, block], block)
                 converted, drive = self._converted(whole, len(whole) - len(block))
                 self._waiting.append(drive)
                 yield converted
@@ -71,13 +72,3 @@ class ByEngine:
 def _tail(block: Recording) -> Recording:
     """The last rows of a block, on which those behind it depend."""
     return block.select(np.arange(np.searchsorted(block.time, block.time[-1] - TAIL), len(block)))
-
-
-def _behind(tail: Recording, block: Recording) -> Recording:
-    """A block behind the tail of the one before."""
-    return replace(
-        block,
-        time=np.concatenate([tail.time, block.time]),
-        channels={n: np.concatenate([tail.channels[n], v]) for n, v in block.channels.items()},
-        labels={n: np.concatenate([tail.labels[n], v]) for n, v in block.labels.items()},
-    )

@@ -27,33 +27,29 @@ _MISSING = (math.nan,) * lib.TG_SLOTS
 _BLOCK = 1 << 18  # rows a call: Ctrl-C and progress get a turn between calls
 
 
+def twin_slots(quantity: str, columns: Sequence[str]) -> dict[str, int]:
+    """The places of columns that hold a quantity of the kernel's, one behind the other, each with its twin ``_std``."""
+    value, std = (getattr(lib, f"TG_OUT_{quantity.upper()}{end}") for end in ("", "_STD"))
+    return {
+        name: place + k
+        for k, column in enumerate(columns)
+        for name, place in ((column, value), (f"{column}_std", std))
+    }
+
+
 def estimate_slots(vehicle: Vehicle, *, adaptive: bool = False) -> dict[str, int]:
     """The place in tg_estimate.value of each column of an estimates table, in the table's order.
 
     ``adaptive``: with A_k, ``adaptation_<state>`` of each state, which the adaptive and the supervised policy have.
     """
     slots = {"distance": lib.TG_OUT_DISTANCE}
-
-    def add(name: str, slot: int, std: int, place: int = 0) -> None:
-        slots[name] = slot + place
-        slots[f"{name}_std"] = std + place
-
-    add("ground_speed", lib.TG_OUT_GROUND_SPEED, lib.TG_OUT_GROUND_SPEED_STD)
-    add("soil_resistance", lib.TG_OUT_SOIL_RESISTANCE, lib.TG_OUT_SOIL_RESISTANCE_STD)
-    for quantity, slot, std in (
-        ("wheel_speed", lib.TG_OUT_WHEEL_SPEED, lib.TG_OUT_WHEEL_SPEED_STD),
-        ("adhesion", lib.TG_OUT_ADHESION, lib.TG_OUT_ADHESION_STD),
-        ("slip", lib.TG_OUT_SLIP, lib.TG_OUT_SLIP_STD),
-        ("net_traction", lib.TG_OUT_NET_TRACTION, lib.TG_OUT_NET_TRACTION_STD),
-        ("efficiency", lib.TG_OUT_EFFICIENCY, lib.TG_OUT_EFFICIENCY_STD),
-    ):
-        for i, wheel in enumerate(vehicle.wheels):
-            add(f"{quantity}_{wheel}", slot, std, i)
+    slots |= twin_slots("ground_speed", ["ground_speed"]) | twin_slots("soil_resistance", ["soil_resistance"])
+    for quantity in ("wheel_speed", "adhesion", "slip", "net_traction", "efficiency"):
+        slots |= twin_slots(quantity, [f"{quantity}_{wheel}" for wheel in vehicle.wheels])
     for k, axle in enumerate(vehicle.axle_names):
         slots[f"vertical_load_{axle}"] = lib.TG_OUT_VERTICAL_LOAD + k
-    add("curve_a", lib.TG_OUT_CURVE, lib.TG_OUT_CURVE_STD)
-    for i, wheel in enumerate(vehicle.wheels):
-        add(f"curve_a_{wheel}", lib.TG_OUT_WHEEL_CURVE, lib.TG_OUT_WHEEL_CURVE_STD, i)
+    slots |= twin_slots("curve", ["curve_a"])
+    slots |= twin_slots("wheel_curve", [f"curve_a_{wheel}" for wheel in vehicle.wheels])
     slots["warning"] = lib.TG_OUT_WARNING
     slots["warning_usual_slip"] = lib.TG_OUT_USUAL_SLIP
     for k, sign in enumerate(SIGNS):

@@ -10,7 +10,7 @@ import numpy as np
 
 from terragrip._kernel import ffi, lib
 from terragrip.errors import InputError
-from terragrip.estimation.engine import OF_FORCES, SIGNS
+from terragrip.estimation.engine import OF_FORCES, SIGNS, twin_slots
 from terragrip.estimation.methods import SLIP_ONLY
 from terragrip.estimation.noise import DELAY
 from terragrip.estimation.settings import WITHOUT_TORQUE, Thresholds, put_axles, wheel_radii
@@ -123,21 +123,11 @@ def slots_in(rims: Collection[Rim]) -> dict[str, int]:
 
 def slots_out(rims: Collection[Rim]) -> dict[str, int]:
     """The place in tg_estimate.value of each column of estimates from speeds alone, in the table's order."""
-    slots = {
-        "distance": lib.TG_OUT_DISTANCE,
-        "ground_speed": lib.TG_OUT_GROUND_SPEED,
-        "ground_speed_std": lib.TG_OUT_GROUND_SPEED_STD,
-    }
-    for quantity, value, std in (
-        ("wheel_speed", lib.TG_OUT_WHEEL_SPEED, lib.TG_OUT_WHEEL_SPEED_STD),
-        ("slip", lib.TG_OUT_SLIP, lib.TG_OUT_SLIP_STD),
-        ("zero_slip_radius", lib.TG_OUT_ZERO_SLIP_RADIUS, lib.TG_OUT_ZERO_SLIP_RADIUS_STD),
-    ):
-        for i, rim in enumerate(rims):
-            if quantity != "slip" and not rim.has_radius:
-                continue
-            slots[f"{quantity}_{rim.wheel}"] = value + i
-            slots[f"{quantity}_{rim.wheel}_std"] = std + i
+    slots = {"distance": lib.TG_OUT_DISTANCE} | twin_slots("ground_speed", ["ground_speed"])
+    # Without a radius there is one rim, the drive train.
+    for quantity in ("wheel_speed", "slip", "zero_slip_radius"):
+        if quantity == "slip" or all(rim.has_radius for rim in rims):
+            slots |= twin_slots(quantity, [f"{quantity}_{rim.wheel}" for rim in rims])
     slots |= {"warning": lib.TG_OUT_WARNING, "warning_usual_slip": lib.TG_OUT_USUAL_SLIP}
     slots |= {f"warning_{sign}": lib.TG_OUT_SIGN + k for k, sign in enumerate(SIGNS) if sign not in OF_FORCES}
     return slots | {"nis": lib.TG_OUT_NIS, "channels": lib.TG_OUT_CHANNELS}

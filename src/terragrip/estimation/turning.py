@@ -11,6 +11,7 @@ from terragrip.arrays import Bools, Floats
 from terragrip.estimation.rims import Rim, rims_of
 from terragrip.physics.slip import middle_speed
 from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.survey import joined
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
@@ -105,14 +106,10 @@ def _turns(log: LogBlocks) -> Recording:
     """What shows the turns of a whole log."""
     names = ("latitude", "longitude", _YAW_RATE)
     parts = [
-        (block.time, {n: block.channels[n] for n in names if n in block.channels}) for block in log.blocks()
+        Recording(block.time, {n: block.channels[n] for n in names if n in block.channels})
+        for block in log.blocks()
     ]
-    known = {name for _, channels in parts for name in channels}
-    joined = {
-        name: np.concatenate([own.get(name, np.full(len(time), np.nan)) for time, own in parts])
-        for name in known
-    }
-    return Recording(np.concatenate([time for time, _ in parts]), joined)
+    return joined(parts, parts[-1])
 
 
 def _silences(log: Recording) -> Floats:

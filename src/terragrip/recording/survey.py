@@ -97,7 +97,7 @@ def survey_of(log: LogBlocks, progress: Progress | None = None) -> Survey:
     if len(last) == rows:  # one block: its rows need not be joined
         sample = last.select(sampled_rows(rows))
     else:
-        sample = _joined([part for number in sorted(kept) for part in kept[number]], last)
+        sample = joined([part for number in sorted(kept) for part in kept[number]], last)
     empty = tuple(name for name in sample.channels if name not in holding)
     notes = [f"{name} has no value and is left out." for name in empty]
     if sample.delay is None:
@@ -132,7 +132,7 @@ def _copied(block: Recording, rows: slice) -> Recording:
     )
 
 
-def _joined(parts: list[Recording], last: Recording) -> Recording:
+def joined(parts: Sequence[Recording], last: Recording) -> Recording:
     """Parts of a log as one recording; the reader's remarks are complete with its ``last`` block."""
     return replace(
         last,

@@ -32,9 +32,8 @@ class Standardization:
         scale = scale_about(centre, features)
         points = scaled(features, centre, scale)
         runs, of_run = np.unique(groups, return_inverse=True)
-        size = np.bincount(of_run).astype(float)[:, None]
         means = np.stack([points[of_run == r].mean(axis=0) for r in range(len(runs))])
-        within = (np.bincount(of_run) @ _variances(points, means, of_run, size)) / len(points)
+        within = np.mean((points - means[of_run]) ** 2, axis=0)
         class_of = np.array([codes[of_run == r][0] for r in range(len(runs))])
         by_class = [means[class_of == c] for c in np.unique(class_of)]
         between_runs = np.mean([m.var(axis=0) for m in by_class], axis=0)
@@ -75,9 +74,3 @@ def scaled(features: Floats, centre: Floats, scale: Floats) -> Floats:
 
 def _count(measured: Bools) -> Ints:
     return np.maximum(measured.sum(axis=0), 1)
-
-
-def _variances(points: Floats, means: Floats, of_run: Ints, size: Floats) -> Floats:
-    squares = np.zeros_like(means)
-    np.add.at(squares, of_run, (points - means[of_run]) ** 2)
-    return squares / size
