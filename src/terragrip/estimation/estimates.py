@@ -112,6 +112,11 @@ class Estimates:
         return bool(wheels_with("adhesion", self.columns))
 
     @property
+    def soil(self) -> npt.NDArray[np.object_]:
+        """The log's soil label of each row (n,), empty where it has none."""
+        return self.labels.get("soil", np.full(len(self), "", dtype=object))
+
+    @property
     def method(self) -> str:
         """Name of the method."""
         return str(self.about.get("method", ""))

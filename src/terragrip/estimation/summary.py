@@ -65,10 +65,7 @@ class Tally:
         for name in quantities(block):
             for column in (name, f"{name}_std"):
                 self.sample.setdefault(column, []).append(block[column][chosen])
-        soil = block.labels.get("soil")
-        self.sample.setdefault("label", []).append(
-            np.full(len(chosen), "", dtype=object) if soil is None else soil[chosen]
-        )
+        self.sample.setdefault("label", []).append(block.soil[chosen])
         self._sampled += len(chosen)
         self._count_time(block)
         if self._sampled > _MOST:  # half of them are enough
@@ -86,8 +83,7 @@ class Tally:
             self.moving[name] = self.moving.get(name, 0.0) + min(float(block.time[0]) - begun, longest)
         lasts = np.minimum(np.diff(block.time, append=block.time[-1]), longest)
         moving = block.event_codes == 0
-        soil = block.labels.get("soil")
-        names = np.full(len(block), "", dtype=object) if soil is None else soil
+        names = block.soil
         self._last_moving = (str(names[-1]), float(block.time[-1])) if moving[-1] else None
         for name in dict.fromkeys(names.tolist()):
             self.moving[str(name)] = self.moving.get(str(name), 0.0) + float(

@@ -141,7 +141,7 @@ def _plane(estimates: Estimates, quantity: str) -> Figure:
         )
     calm = np.flatnonzero(estimates.event_codes == 0)
     calm = calm[:: max(1, len(calm) * len(wheels) // (3 * _MOST))]
-    soils = estimates.labels.get("soil", np.full(len(estimates), "", dtype=object))[calm]
+    soils = estimates.soil[calm]
     names = sorted(set(soils.tolist()))
     figure = notebook_figure(7.2, 4.6)
     with styled():

@@ -62,7 +62,7 @@ class LogTally:
         distance = block["distance"] if "distance" in block else np.zeros(len(block))
         metres = np.diff(distance, prepend=self.total.distance)
         usable = block.event_codes == 0
-        soil = block.labels.get("soil", np.full(len(block), "", dtype=object))
+        soil = block.soil
         columns = {name: _mean_of(block, name) for name in MEANS}
         for label in dict.fromkeys(soil.tolist()):
             rows = usable & (soil == label)

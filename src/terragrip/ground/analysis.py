@@ -96,10 +96,8 @@ def with_columns(estimates: Estimates, blocks: Blocks, timeline: Timeline, onlin
 
 def block_labels(estimates: Estimates, blocks: Blocks) -> NDArray[np.object_]:
     """The recording's label in the middle of each block (blocks,), "" where vehicle and tool are on different soils or there is none."""
-    if "soil" not in estimates.names:
-        return np.full(len(blocks), "", dtype=object)
-    one = settled(estimates["distance"], estimates["soil"], whole_length(estimates.vehicle))
-    labels = np.where(one, estimates["soil"], "")
+    one = settled(estimates["distance"], estimates.soil, whole_length(estimates.vehicle))
+    labels = np.where(one, estimates.soil, "")
     middle = np.cumsum(blocks.rows) - blocks.rows // 2 - 1
     return np.asarray(labels[middle], dtype=object)
 

@@ -98,29 +98,23 @@ class Emissions:
         `driven` (blocks,): way since the block before [m]. 0 where a block tells nothing of the ground.
         """
         out = np.zeros((len(blocks), self.states.size))
-        weight = level_weight(driven, self.length)
-        rough = np.isfinite(blocks.roughness).all(axis=1)
-        for rows, is_rough in ((blocks.known & rough, True), (blocks.known & ~rough, False)):
-            if rows.any():
-                out[rows] = self._likelihood(blocks[rows], is_rough, weight[rows])
+        known = blocks.known
+        out[known] = self._likelihood(blocks[known], level_weight(driven, self.length)[known])
         return out
 
-    def _likelihood(self, blocks: Blocks, rough: bool, weight: Floats) -> Floats:
-        roughness = blocks.roughness if rough else None
-        level = broad_level(blocks)
+    def _likelihood(self, blocks: Blocks, weight: Floats) -> Floats:
+        roughness, level = blocks.roughness, broad_level(blocks)
         columns = []
         for name, soil in self.soils.items():
             signature = self.signatures[name]
             mine = weight * mixed(_level(soil, signature, blocks), level)
             if name not in self.roughness.means:
-                several = np.repeat(mine[:, None], ROUGHNESSES.size, axis=1)
-                columns.append(several if roughness is None else several + textures(roughness))
+                columns.append(mine[:, None] + textures(roughness))
                 continue
-            if roughness is not None:
-                own = bivariate(roughness - self.roughness.means[name], self.roughness.covariance)
-                mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
+            own = bivariate(roughness - self.roughness.means[name], self.roughness.covariance)
+            mine = mine + tempered(mixed(own, broad_roughness(roughness)), ROUGHNESS_TIME)
             columns.append(mine[:, None])
-        return np.concatenate([*columns, cells(blocks, roughness, weight)], axis=1)
+        return np.concatenate([*columns, cells(blocks, weight)], axis=1)
 
     def _comparable(self, signature: Signature) -> bool:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by

@@ -23,8 +23,8 @@ _STRAY = 0.01
 
 
 def tempered(logs: Floats, seconds: float) -> Floats:
-    """Log likelihoods of blocks that repeat each other for `seconds`: each counts for PERIOD / seconds."""
-    return logs * min(PERIOD / seconds, 1.0)
+    """Log likelihoods of blocks that repeat each other for `seconds`: each counts for PERIOD / seconds; 0, which tells nothing, for NaN."""
+    return np.where(np.isnan(logs), 0.0, logs * min(PERIOD / seconds, 1.0))
 
 
 def level_weight(driven: Floats, length: float) -> Floats:
@@ -37,8 +37,9 @@ def level_weight(driven: Floats, length: float) -> Floats:
 
 
 def mixed(mine: Floats, broad: Floats) -> Floats:
-    """Log density of a law with outliers."""
-    return np.asarray(np.logaddexp(np.log(1 - _STRAY) + mine, np.log(_STRAY) + broad))
+    """Log density of a law with outliers; NaN stays, as of a roughness that is not known."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.logaddexp(np.log(1 - _STRAY) + mine, np.log(_STRAY) + broad))
 
 
 def normal(error: Floats, variance: Floats) -> Floats:

@@ -44,9 +44,8 @@ _LEAST_RESISTANCE_SD = 0.01
 _ROUGHNESS_COVARIANCE = np.array([[0.50, 0.24], [0.24, 0.32]])
 
 
-def cells(blocks: Blocks, roughness: Floats | None, weight: Floats) -> Floats:
-    """Tempered log likelihoods (blocks, CELLS) of known blocks; `roughness` (blocks, 2), None where it is not known;
-    `weight` (blocks,): what each block's level counts for."""
+def cells(blocks: Blocks, weight: Floats) -> Floats:
+    """Tempered log likelihoods (blocks, CELLS) of known blocks; `weight` (blocks,): what each block's level counts for."""
     rows = len(blocks)
     level = broad_level(blocks)
     broad = level[:, None, None, None]
@@ -55,16 +54,13 @@ def cells(blocks: Blocks, roughness: Floats | None, weight: Floats) -> Floats:
     off = blocks.resistance[:, None, None] - RESISTANCES
     resistance = normal(off, spread[:, None] + blocks.resistance_variance[:, None, None])[:, :, None, :]
     out = weight[:, None, None, None] * mixed(adhesion + resistance, broad)
-    if roughness is not None:
-        out = out + textures(roughness)[:, :, None, None]
-    none = weight * level
-    if roughness is not None:
-        none = none + tempered(broad_roughness(roughness), ROUGHNESS_TIME)
+    out = out + textures(blocks.roughness)[:, :, None, None]
+    none = weight * level + tempered(broad_roughness(blocks.roughness), ROUGHNESS_TIME)
     return np.column_stack([out.reshape(rows, GRID), none])
 
 
 def textures(roughness: Floats) -> Floats:
-    """Tempered log likelihoods (blocks, ROUGHNESSES) of the roughness alone."""
+    """Tempered log likelihoods (blocks, ROUGHNESSES) of the roughness (blocks, 2) alone; 0 where it is not known."""
     middle = np.column_stack([ROUGHNESSES, ROUGHNESSES + ADHESION_ROUGHNESS])
     mine = bivariate(roughness[:, None, :] - middle, _ROUGHNESS_COVARIANCE)
     return tempered(mixed(mine, broad_roughness(roughness)[:, None]), ROUGHNESS_TIME)

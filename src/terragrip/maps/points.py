@@ -73,7 +73,7 @@ def points_of(estimates: Estimates, places: Places, way: Floats, size: float, ru
         if n not in _SKIPPED and not n.startswith(("warning_", "curve_", "adaptation_"))
     ]
     middle = rows[np.minimum(begin + count // 2, len(rows) - 1)]
-    labels = estimates.labels.get("soil", np.full(len(estimates), "", dtype=object))
+    labels = estimates.soil
     return Points(
         np.full(len(begin), run), estimates.time[middle], mean(places.east), mean(places.north), places.heading[middle],
         places.headland[middle], {name: mean(estimates[name]) for name in names}, labels[middle], estimates["event"][middle],

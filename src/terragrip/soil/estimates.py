@@ -188,7 +188,7 @@ def pairs_of(estimates: Estimates, run: str, soil: str | None = None) -> list[Ru
 def _labels(estimates: Estimates, soil: str | None) -> NDArray[np.object_]:
     if soil is not None:
         return np.full(len(estimates), soil, dtype=object)
-    return estimates["soil"] if "soil" in estimates.names else np.full(len(estimates), "", dtype=object)
+    return estimates.soil
 
 
 def roll_of(vehicle: Vehicle) -> float:

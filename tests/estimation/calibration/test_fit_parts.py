@@ -285,14 +285,6 @@ def test_the_balance_of_forces_of_windows(vehicle: Vehicle) -> None:
     np.testing.assert_allclose(nuisance[:, 2], np.linspace(0, 0.2, N))
 
 
-def test_evidence_of_the_scale_is_an_entry_a_log() -> None:
-    data = table(recording=np.repeat([0, 1], 10), count=np.arange(20.0))
-    logs = [Recording(np.zeros(1), {}, source="a"), Recording(np.zeros(1), {})]
-    first, second = torque_scale._evidence(data, logs)
-    assert (first.source, first.start, first.end, first.samples) == ("a", 0.0, 10.0, 45)
-    assert (second.source, second.start, second.end, second.samples) == ("recording 2", 10.0, 20.0, 145)
-
-
 def test_rows_of_shared_curves(vehicle: Vehicle) -> None:
     data = table(wheel_acceleration=0.5 * np.ones((N, 4)))
     driven = np.array([0, 1, 3])

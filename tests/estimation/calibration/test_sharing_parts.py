@@ -115,9 +115,8 @@ def test_the_covariance_is_that_of_leaving_out_each_block_and_of_the_priors() ->
             name: getattr(data, name)[kept]
             for name in ("torque", "known", "leverage", "slip", "soil", "block")
         }
-        rest = replace(
-            problem, data=replace(data, **parts), steepness=problem.steepness[kept], local=problem.local[kept]
-        )
+        curves = replace(problem.curves, steepness=problem.steepness[kept])
+        rest = replace(problem, data=replace(data, **parts), curves=curves, local=problem.local[kept])
         values.append(rest.solve(best, 1.0))
     apart = np.array(values) - np.mean(values, axis=0)
     fit = problem.fit(best, 1.0)

@@ -126,6 +126,10 @@ def test_reverse_counts_too(vehicle: Vehicle) -> None:
     both = identify_torque_scale([log, back], vehicle)
     assert both.value == pytest.approx(1.0, abs=0.02)
     assert both.samples == pytest.approx(2 * identify_torque_scale(log, vehicle).samples, rel=0.02)
+    assert [part.source for part in both.evidence] == [
+        log.source or "recording 1",
+        back.source or "recording 2",
+    ]
 
 
 def test_it_refuses_what_tells_nothing(drive: Make, vehicle: Vehicle) -> None:

@@ -11,7 +11,7 @@ import pytest
 from terragrip.estimation.calibration import gains, radii, torque_scale, zeros
 from terragrip.estimation.calibration.plausible import turns_unseen
 from terragrip.estimation.calibration.windows import Windows, track_blocks
-from terragrip.estimation.calibration.zeros import Spell, evidence, resting, spells, standstills
+from terragrip.estimation.calibration.zeros import evidence, resting, rows_of, spells, standstills
 from terragrip.vehicle import Vehicle
 from window_table import RADIUS, N, stopped, table
 
@@ -132,10 +132,10 @@ def test_where_the_turn_is_known_a_pass_may_bend(vehicle: Vehicle, apart: float,
 
 
 def test_left_middle_and_right_of_an_axle(vehicle: Vehicle) -> None:
-    assert [radii._side(vehicle, k) for k in range(4)] == [1, -1, 1, -1]
+    assert radii._sides(vehicle).tolist() == [1, -1, 1, -1]
     six = {"a": {"mass": 70, "wheels": ["l", "m", "r"]}, "b": {"mass": 70, "wheels": ["x"]}}
     other = Vehicle.from_dict({**vehicle.to_dict(), "axles": six, "uncertainty": {}})
-    assert [radii._side(other, k) for k in range(4)] == [1, 0, -1, 0]
+    assert radii._sides(other).tolist() == [1, 0, -1, 0]
 
 
 @pytest.mark.parametrize(("apart", "turning"), [(0.039, False), (0.041, True)])
@@ -207,8 +207,8 @@ def test_a_fortieth_is_of_all_logs_together() -> None:
 def test_runs_of_windows_end_with_a_log_and_last_long_enough() -> None:
     wanted = np.array([1, 1, 0, 1, 1, 1, 1, 0, 1], dtype=bool)
     log = np.array([0, 0, 0, 0, 0, 1, 1, 1, 1])
-    assert spells(wanted, log, 2) == [Spell(0, 1), Spell(3, 4), Spell(5, 6)]
-    assert spells(wanted, log, 1)[-1] == Spell(8, 8)
+    assert spells(wanted, log, 2) == [slice(0, 2), slice(3, 5), slice(5, 7)]
+    assert spells(wanted, log, 1)[-1] == slice(8, 9)
     assert spells(wanted, log, 3) == []
     assert spells(wanted[:0], log[:0], 1) == []
 
@@ -217,9 +217,9 @@ def test_a_standstill_leaves_out_the_windows_of_stop_and_start_but_not_a_logs_ow
     vehicle: Vehicle,
 ) -> None:
     stops = stopped((0, 4), (10, 14), (20, 23), (36, 40))
-    assert standstills(stops, vehicle) == [Spell(0, 2), Spell(11, 12), Spell(37, 39)]
+    assert standstills(stops, vehicle) == [slice(0, 3), slice(11, 13), slice(37, 40)]
     two = stopped((10, 18), recording=np.repeat([0, 1], [14, 26]))
-    assert standstills(two, vehicle) == [Spell(11, 13), Spell(14, 16)]
+    assert standstills(two, vehicle) == [slice(11, 14), slice(14, 17)]
     slow = stopped((10, 20))
     for value, count in ((0.029, 1), (0.031, 0)):
         slow.ground_speed[10:20] = -value
@@ -232,20 +232,20 @@ def test_a_standstill_leaves_out_the_windows_of_stop_and_start_but_not_a_logs_ow
 
 def test_evidence_is_an_entry_a_log_with_its_span_and_samples() -> None:
     windows = stopped(recording=np.repeat([0, 1], 20), count=np.arange(40.0))
-    stops = [Spell(2, 3), Spell(10, 10), Spell(30, 31)]
-    first, second = evidence(windows, stops, ["a", "b"])
+    stops = [slice(2, 4), slice(10, 11), slice(30, 32)]
+    first, second = evidence(windows, rows_of(stops), ["a", "b"])
     assert (first.source, first.start, first.end, first.samples) == ("a", 1.0, 5.5, 15)
     assert (second.source, second.start, second.end, second.samples) == ("b", 15.0, 16.0, 61)
-    assert evidence(windows, stops[:1], ["a", "b"], np.full(40, 3.0))[0].samples == 6
+    assert evidence(windows, stops[0], ["a", "b"], np.full(40, 3.0))[0].samples == 6
 
 
-def readings(*means: float, columns: tuple[float, ...] = (1.0,)) -> tuple[Windows, np.ndarray, list[Spell]]:
+def readings(*means: float, columns: tuple[float, ...] = (1.0,)) -> tuple[Windows, np.ndarray, list[slice]]:
     """Stops of two seconds with a second of driving after each, and what each reads, times each of ``columns``."""
-    stops = [Spell(6 * k, 6 * k + 3) for k in range(len(means))]
-    windows = stopped(*((spell.first, spell.last + 1) for spell in stops))
+    stops = [slice(6 * k, 6 * k + 4) for k in range(len(means))]
+    windows = stopped(*((spell.start, spell.stop) for spell in stops))
     values = np.full(40, 30.0)
     for spell, mean in zip(stops, means, strict=True):
-        values[spell.rows] = mean
+        values[spell] = mean
     return windows, values[:, None] * columns, stops
 
 
@@ -281,19 +281,19 @@ def test_where_one_wheel_holds_the_vehicle_no_wheel_reads_its_zero() -> None:
 
 def test_one_stop_counts_where_it_lasts_and_stops_without_driving_between_are_one() -> None:
     values, count = np.full((40, 1), 0.2), np.full(40, 100.0)
-    long, short = [Spell(0, 7)], [Spell(0, 6)]
+    long, short = [slice(0, 8)], [slice(0, 7)]
     windows = stopped((0, 20))
     assert resting(windows, values, long, count, 1.0, MOST) == long
     assert resting(windows, values, short, count, 1.0, MOST) == []
-    assert resting(windows, values, [Spell(0, 2), Spell(5, 8)], count, 1.0, MOST) == []
+    assert resting(windows, values, [slice(0, 3), slice(5, 9)], count, 1.0, MOST) == []
     two_logs = replace(windows, recording=np.repeat([0, 1], [4, 36]))
-    assert len(resting(two_logs, values, [Spell(0, 2), Spell(5, 8)], count, 1.0, MOST)) == 2
+    assert len(resting(two_logs, values, [slice(0, 3), slice(5, 9)], count, 1.0, MOST)) == 2
 
 
 @pytest.mark.parametrize(("known", "finite"), [(1, False), (2, True)])
 def test_a_mean_over_spells_needs_two_windows(known: int, finite: bool) -> None:
     values = np.where(np.arange(4) < known, 2.0, np.nan)
-    mean, error = zeros.spell_mean(values, [Spell(0, 3)], np.full(4, 100.0), 0.5)
+    mean, error = zeros.spell_mean(values, [slice(0, 4)], np.full(4, 100.0), 0.5)
     assert (np.isfinite(mean), np.isfinite(error)) == (finite, finite)
 
 
@@ -313,7 +313,7 @@ def test_a_bar_that_moves_no_more_than_its_noise_is_free(scatter: float, free: b
     """Windows of 100 samples with noise of 5: .5 each."""
     bar = 3.0 + scatter * 0.5 * np.where(np.arange(40) % 2, 1.0, -1.0)
     windows = stopped(drawbar=bar, drawbar_count=np.full(40, 100.0))
-    assert zeros._free_passes(windows, 5.0) == ([Spell(0, 39)] if free else [])
+    assert zeros._free_passes(windows, 5.0) == ([slice(0, 40)] if free else [])
     assert zeros._free_passes(stopped((15, 25), drawbar=bar, drawbar_count=np.full(40, 100.0)), 5.0) == []
     slow = replace(windows, ground_speed=np.full(40, 0.09))
     assert zeros._free_passes(slow, 5.0) == []

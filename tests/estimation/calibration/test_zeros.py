@@ -10,7 +10,7 @@ from scipy.stats import sem
 
 from terragrip.errors import InputError
 from terragrip.estimation import calibrate
-from terragrip.estimation.calibration.zeros import Spell, spell_mean
+from terragrip.estimation.calibration.zeros import spell_mean
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
@@ -46,7 +46,7 @@ def test_torque_that_rises_before_the_wheels_turn_is_no_zero(drive: Make, vehicl
 @pytest.mark.parametrize("readings", [[0.2, 0.6], [0.2, 0.6, 0.1], [0.3, 0.6, 0.2, 0.5, 0.2]])
 def test_what_differs_from_stop_to_stop_is_in_the_error(readings: list[float]) -> None:
     """The standard error of the stops' means, though each stop reads the same all along."""
-    stops = [Spell(100 * k, 100 * k + 49) for k in range(len(readings))]
+    stops = [slice(100 * k, 100 * k + 50) for k in range(len(readings))]
     values = np.repeat(readings, 100)
     value, error = spell_mean(values, stops, np.full(len(values), 25.0), noise=0.1)
     within = max(
@@ -59,7 +59,7 @@ def test_what_differs_from_stop_to_stop_is_in_the_error(readings: list[float]) -
 
 
 def test_of_one_stop_the_noise_alone_is_in_the_error() -> None:
-    value, error = spell_mean(np.full(50, 0.3), [Spell(0, 49)], np.full(50, 25.0), noise=0.1)
+    value, error = spell_mean(np.full(50, 0.3), [slice(0, 50)], np.full(50, 25.0), noise=0.1)
     assert (value, error) == (pytest.approx(0.3), pytest.approx(0.1 / np.sqrt(50 * 25)))
 
 

@@ -170,9 +170,8 @@ def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
         if len(windows) > 1
         else np.zeros(len(windows))
     )
-    # By the wheels' places in their axles' lists: a track may not be known.
-    places = [np.arange(count) for count in np.bincount(vehicle.wheel_axle)]
-    left, right = (np.concatenate([s * (own[::-1] - own) > 0 for own in places]) for s in (1, -1))
+    sides = _sides(vehicle)
+    left, right = sides > 0, sides < 0
     straight = np.ones(len(windows), dtype=bool)
     if left.any() and right.any():
         speed = rim.mean(axis=1)
@@ -184,6 +183,12 @@ def _passes(windows: Windows, vehicle: Vehicle) -> Bools:
     whole = windows.count > 0.5 * np.median(windows.count[windows.count > 0])
     moving = (windows.ground_speed > _SLOWEST) & np.all(rim > _SLOWEST, axis=1)
     return whole & moving & straight & (change < _STEADY * GRAVITY)
+
+
+def _sides(vehicle: Vehicle) -> Ints:
+    """1 left, -1 right, 0 in the middle (w,), by the places in the axles' lists: a track may not be known."""
+    places = [np.arange(count) for count in np.bincount(vehicle.wheel_axle)]
+    return np.concatenate([np.sign(own[::-1] - own) for own in places])
 
 
 def _most(adhesion: Floats) -> float:

@@ -19,12 +19,13 @@ over blocks of track.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.estimation.calibration.steepness import steepness_of
+from terragrip.estimation.calibration.steepness import Steepness, steepness_of
 
 _ROUNDS = 60
 _CLOSE = 1e-8  # change of every ln k
@@ -89,20 +90,37 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
     if len(data.torque) < _LEAST_WINDOWS:
         return None
     best = _solved(data)
-    error = min(best.problem.steepness_std, _MOST_STRETCH)
+    error = min(best.problem.curves.relative_std, _MOST_STRETCH)
     others = [(0.5, _solved(data, best.values, stretch=1 + sign * error)) for sign in (-1.0, 1.0)]
     others += [
         (chance, _solved(data, best.values, form=form))
-        for form, chance in enumerate(best.problem.chance)
+        for form, chance in enumerate(best.problem.curves.chance)
         if chance > _UNLIKELY
     ]
-    added = sum(
-        chance * np.outer(change, change)
-        for chance, other in others
-        for change in [other.differences() - best.differences()]
+    problem, w = best.problem, data.torque.shape[1]
+    # What takes (ln k, e) to their differences: an error that all wheels have leaves no trace. A larger radius is a longer lever.
+    apart = np.eye(w) - 1 / w
+    center = np.block([[np.eye(w), -apart], [np.zeros((w, w)), apart]])
+    found = center @ best.values[: 2 * w]
+    changes = [(chance, center @ other.values[: 2 * w] - found) for chance, other in others]
+    covariance = problem.covariance(best.values, best.scale, data.block)[: 2 * w, : 2 * w]
+    alone = problem.covariance(best.values, best.scale, data.block, lasting=False)[:w, :w]
+    return SharedGains(
+        log_gain=found[:w],
+        radius=found[w:],
+        covariance=center @ covariance @ center.T
+        + sum(c * np.outer(change, change) for c, change in changes),
+        windows=len(data.block),
+        blocks=len(np.unique(data.block)),
+        load_sensitivity=center @ problem.load_sensitivity(best.values, best.scale),
+        lasting=float(np.sqrt(np.trace(covariance[:w, :w]) / np.trace(alone))),
     )
-    fit = best.gains()
-    return replace(fit, covariance=fit.covariance + added)
+
+
+class _Solution(NamedTuple):
+    problem: _Problem
+    values: Floats  # (p,)
+    scale: float  # the design effect that the priors are weighted with
 
 
 def _solved(
@@ -123,42 +141,6 @@ def _solved(
 
 
 @dataclass(frozen=True)
-class _Solution:
-    problem: _Problem
-    values: Floats  # (p,)
-    scale: float  # the design effect that the priors are weighted with
-
-    def center(self) -> Floats:
-        """What takes (ln k, e) to their differences (2 w, 2 w): an error that all wheels have leaves no trace. A larger radius is a
-        longer lever, too."""
-        w = self.problem.data.torque.shape[1]
-        apart = np.eye(w) - 1 / w
-        return np.block([[np.eye(w), -apart], [np.zeros((w, w)), apart]])
-
-    def differences(self) -> Floats:
-        """ln k and e without what all wheels have in common (2 w,)."""
-        center = self.center()
-        return np.asarray(center @ self.values[: len(center)])
-
-    def gains(self) -> SharedGains:
-        """The differences with all that a user needs of them."""
-        problem, center = self.problem, self.center()
-        w, block = len(center) // 2, problem.data.block
-        covariance = problem.covariance(self.values, self.scale, block)[: 2 * w, : 2 * w]
-        alone = problem.covariance(self.values, self.scale, block, lasting=False)[:w, :w]
-        log_gain, radius = np.split(self.differences(), 2)
-        return SharedGains(
-            log_gain=log_gain,
-            radius=radius,
-            covariance=center @ covariance @ center.T,
-            windows=len(block),
-            blocks=len(np.unique(block)),
-            load_sensitivity=center @ problem.load_sensitivity(self.values, self.scale),
-            lasting=float(np.sqrt(np.trace(covariance[:w, :w]) / np.trace(alone))),
-        )
-
-
-@dataclass(frozen=True)
 class _Fit:
     jacobian: Floats  # (n, w, p), of the scaled residual, the part that m_n absorbs removed
     residual: Floats  # (n, w), likewise
@@ -174,12 +156,15 @@ class _Problem:
     data: Sharing
     prior: Floats  # (p, p) precision, p = 3 w, or 3 w + 1
     torque_noise: float
-    steepness: Floats  # (n,) d_n
+    curves: Steepness  # as the levels show it
     local: Floats  # (n,) relative difference of local adhesion between wheels
     stretch: float = 1.0  # factor on what the levels show of the steepness
     form: int | None = None  # the curves' form; None: that which fits best
-    steepness_std: float = 0.0  # how well the steepness is known, relative,
-    chance: Floats = field(default_factory=lambda: np.ones(1))  # and how likely each form is
+
+    @property
+    def steepness(self) -> Floats:
+        """(n,) d_n."""
+        return self.curves.steepness
 
     @classmethod
     def of(cls, data: Sharing) -> _Problem:
@@ -191,7 +176,8 @@ class _Problem:
         if turns:
             prior[-1, -1] = data.yaw_std**-2.0
         noise = 0.02 * float(np.median(np.abs(data.torque)))
-        problem = cls(data, prior, max(noise, 1e-9), np.zeros(n), np.full(n, _LOCAL))
+        flat = Steepness(np.zeros(n), 0.0, np.ones(1))
+        problem = cls(data, prior, max(noise, 1e-9), flat, np.full(n, _LOCAL))
         return problem._with_steepness(np.zeros(len(prior)))
 
     def refined(self, values: Floats) -> _Problem:
@@ -214,8 +200,7 @@ class _Problem:
         curves = steepness_of(
             level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, by_delay, self.form
         )
-        steepness = self.stretch * curves.steepness
-        return replace(self, steepness=steepness, steepness_std=curves.relative_std, chance=curves.chance)
+        return replace(self, curves=replace(curves, steepness=self.stretch * curves.steepness))
 
     def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""

@@ -6,8 +6,7 @@ the ground is level or its slope is measured. Where the readings contradict that
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -41,20 +40,7 @@ _HOLDING = (
 _IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
 
 
-@dataclass(frozen=True)
-class Spell:
-    """Rows ``first`` to ``last`` (inclusive) of the windows, in one recording."""
-
-    first: int
-    last: int
-
-    @property
-    def rows(self) -> slice:
-        """The rows as a slice."""
-        return slice(self.first, self.last + 1)
-
-
-def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
+def standstills(windows: Windows, vehicle: Vehicle) -> list[slice]:
     """Spells in which vehicle and wheels stand, without the window after they stop and the one in which they start: torque rises first."""
     rim = np.abs(windows.wheel_speed) * vehicle.wheel_radius
     standing = (np.abs(windows.ground_speed) < _STANDING) & np.all(rim < _STANDING, axis=1)
@@ -62,15 +48,15 @@ def standstills(windows: Windows, vehicle: Vehicle) -> list[Spell]:
     stops = spells(standing, windows.recording, least)
     begins = np.diff(windows.recording, prepend=-1) != 0
     ends = np.diff(windows.recording, append=-1) != 0
-    return [Spell(s.first + (not begins[s.first]), s.last - (not ends[s.last])) for s in stops]
+    return [slice(s.start + (not begins[s.start]), s.stop - (not ends[s.stop - 1])) for s in stops]
 
 
-def spells(wanted: Bools, recording: Ints, least: int) -> list[Spell]:
-    """Runs of at least ``least`` wanted windows (n,) within one recording."""
+def spells(wanted: Bools, recording: Ints, least: int) -> list[slice]:
+    """The rows of each run of at least ``least`` wanted windows (n,) within one recording."""
     edge = np.flatnonzero(np.diff(wanted.astype(int)) | np.diff(recording)) + 1
     starts, ends = np.r_[0, edge], np.r_[edge, len(wanted)]
     return [
-        Spell(int(a), int(b) - 1)
+        slice(int(a), int(b))
         for a, b in zip(starts, ends, strict=True)
         if b > a and wanted[a] and b - a >= least
     ]
@@ -98,12 +84,12 @@ def evidence(
     )
 
 
-def rows_of(stops: Sequence[Spell]) -> Ints:
+def rows_of(stops: Sequence[slice]) -> Ints:
     """The rows of some spells."""
-    return np.asarray(np.r_[tuple(spell.rows for spell in stops)])
+    return np.asarray(np.r_[tuple(stops)])
 
 
-def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: float) -> tuple[float, float]:
+def spell_mean(values: Floats, stops: Sequence[slice], count: Floats, noise: float) -> tuple[float, float]:
     """Mean and standard error of values (n,) over spells; what varies from spell to spell counts in the error.
 
     ``noise`` is the standard deviation of one of the ``count`` (n,) samples: a few windows may scatter less by chance.
@@ -125,12 +111,12 @@ def spell_mean(values: Floats, stops: Sequence[Spell], count: Floats, noise: flo
 def resting(
     windows: Windows,
     values: Floats,
-    stops: Sequence[Spell],
+    stops: Sequence[slice],
     count: Floats,
     noise: float,
     most: Floats,
     usual: Floats | float = -1.0,
-) -> list[Spell]:
+) -> list[slice]:
     """The stops at which every column of ``values`` (n, k) reads its zero, as far as that can be known; ``noise`` is that of a
     sample, of which a window has ``count`` (n,).
 
@@ -143,7 +129,7 @@ def resting(
     if not stops:
         return []
     means = np.array([stop_means(values, spell) for spell in stops])
-    errors = noise / np.sqrt([max(1.0, count[spell.rows].sum()) for spell in stops])
+    errors = noise / np.sqrt([max(1.0, count[spell].sum()) for spell in stops])
     alike = np.ones((len(stops), len(stops)), dtype=bool)
     if noise > 0:
         apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
@@ -161,22 +147,22 @@ def resting(
     return max(groups, key=lambda group: group[:2])[2] if groups else []
 
 
-def stop_means(values: Floats, spell: Spell) -> Floats:
+def stop_means(values: Floats, spell: slice) -> Floats:
     """Mean (k,) of values (n, k) over a stop, or of (n,); NaN where a column has no value in it."""
-    rows = values[spell.rows]
+    rows = values[spell]
     known = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
         return np.where(known, rows, 0.0).sum(axis=0) / known.sum(axis=0)
 
 
-def _sure(windows: Windows, stops: Sequence[Spell]) -> bool:
+def _sure(windows: Windows, stops: Sequence[slice]) -> bool:
     """Whether stops are more than one, with driving between them, or last long enough."""
     moving = np.abs(windows.ground_speed) > _DRIVING
     apart = (
-        windows.recording[a.last] != windows.recording[b.first] or moving[a.last : b.first].any()
+        windows.recording[a.stop - 1] != windows.recording[b.start] or moving[a.stop - 1 : b.start].any()
         for a, b in pairwise(stops)
     )
-    return sum(spell.last - spell.first + 1 for spell in stops) * windows.length >= _ALONE or any(apart)
+    return len(rows_of(stops)) * windows.length >= _ALONE or any(apart)
 
 
 def torque_zeros(
@@ -194,16 +180,19 @@ def torque_zeros(
     stated = 3 * (vehicle.uncertainty.drive_torque_offset or 0.0)
     allowed = np.maximum(stated, _IDLE_SHARE * _work(windows, torque))
     calm = resting(windows, torque, stops, windows.torque_count, noise, allowed, stated)
-    shares = {spell: _held_share(windows, vehicle, torque, spell) for spell in stops}
-    holding = [spell for spell, share in shares.items() if _HOLDING[0] < share < _HOLDING[1]]
+    sloped = [(spell, _held_share(windows, vehicle, torque, spell)) for spell in stops]
+    sloped = [(spell, share) for spell, share in sloped if np.isfinite(share)]
+    holding = [spell for spell, share in sloped if _HOLDING[0] < share < _HOLDING[1]]
+    # On a slope on which the torques do not hold the vehicle they read their zeros.
+    released = [spell for spell, _ in sloped if spell not in holding]
     level = 0.0  # N m: what may hold the vehicle unseen, where it is held on slopes
-    if holding and not _released(calm, shares, holding):
+    if holding and not any(spell in released for spell in calm):
         free = [spell for spell in stops if spell not in holding]
         calm = resting(windows, torque, free, windows.torque_count, noise, allowed, stated)
         if not calm:
             why = "at standstill on a slope the torques are those that hold the vehicle: stand with the motors off"
             return [], [Unknown(key, why)]
-        if not _released(calm, shares, holding):
+        if not any(spell in released for spell in calm):
             level = _DEFAULT_PITCH * vehicle.mass * GRAVITY * float(vehicle.wheel_radius.mean()) / len(driven)
     if not calm:
         least = min(
@@ -229,7 +218,7 @@ def torque_zeros(
     return quantities, []
 
 
-def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: Spell) -> float:
+def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: slice) -> float:
     """How much of the weight along a measured slope the driven wheels' ``torque`` (n, k) carries at a stop; NaN where it is level to three
     standard deviations of a pitch sensor's zero, or no pitch is known."""
     pitch = float(stop_means(windows.pitch[:, None], spell)[0])
@@ -237,11 +226,6 @@ def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: Spell
         return float("nan")
     thrust = np.sum(stop_means(torque, spell) / vehicle.wheel_radius[vehicle.driven])
     return float(thrust / (vehicle.mass * GRAVITY * np.sin(pitch)))
-
-
-def _released(stops: Sequence[Spell], shares: Mapping[Spell, float], holding: Sequence[Spell]) -> bool:
-    """Whether one of the stops is on a slope on which the torques do not hold the vehicle: they read their zeros then."""
-    return any(np.isfinite(shares[spell]) and spell not in holding for spell in stops)
 
 
 def _work(windows: Windows, torque: Floats) -> Floats:
@@ -283,13 +267,13 @@ def drawbar_zero(
     return [Quantity(key, value, error, "N", entry, sentence)], []
 
 
-def _free_passes(windows: Windows, noise: float) -> list[Spell]:
+def _free_passes(windows: Windows, noise: float) -> list[slice]:
     """Spells of driving in which the windows' drawbar means scatter no more than sensor noise makes them."""
     moving = (np.abs(windows.ground_speed) > _DRIVING) & np.isfinite(windows.drawbar)
     least = int(_LEAST_FREE / windows.length)
     stops = []
     for spell in spells(moving, windows.recording, least):
-        bar, count = windows.drawbar[spell.rows], windows.drawbar_count[spell.rows]
+        bar, count = windows.drawbar[spell], windows.drawbar_count[spell]
         if np.std(bar) < 2 * noise / np.sqrt(np.median(count)):
             stops.append(spell)
     return stops
@@ -313,11 +297,11 @@ def inclination_zeros(
             Unknown(bias_key, "there is no acceleration_x"),
             Unknown(pitch_key, why) if pitched else no_pitch,
         ]
-    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.acceleration[s.rows]).any()]
+    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.acceleration[s]).any()]
     if not stops:
         why = f"no standstill of {_LEAST_STANDING:.0f} s or longer"
         return [], [Unknown(bias_key, why), Unknown(pitch_key, why) if pitched else no_pitch]
-    pitched = all(np.isfinite(windows.pitch[s.rows]).any() for s in stops)
+    pitched = all(np.isfinite(windows.pitch[s]).any() for s in stops)
     slope = windows.pitch if pitched else np.zeros(len(windows))
     total, error = spell_mean(
         windows.acceleration - GRAVITY * np.sin(slope), stops, windows.acceleration_count, noise
@@ -355,7 +339,7 @@ def yaw_rate_zero(windows: Windows, vehicle: Vehicle) -> tuple[float, float]:
 
     Where the vehicle never stands for two windows: 0, and what such sensors are off by.
     """
-    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.yaw_rate[s.rows]).any()]
+    stops = [s for s in standstills(windows, vehicle) if np.isfinite(windows.yaw_rate[s]).any()]
     _, error = spell_mean(windows.yaw_rate, stops, windows.count, 0.0) if stops else (np.nan, np.nan)
     if not np.isfinite(error):
         return 0.0, _UNKNOWN_YAW if np.isfinite(windows.yaw_rate).any() else 0.0
