@@ -217,7 +217,13 @@ class Estimates:
         """Read a Parquet file of estimates; raises InputError if it is missing, damaged or no such table."""
         import pyarrow.parquet as pq
 
-        return cls.from_arrow(opened(path, lambda one: pq.ParquetFile(one).read()), source=os.fspath(path))
+        def whole(name: str) -> Estimates:
+            # a column at a time: a table of all of them beside their arrays would double the memory.
+            file = pq.ParquetFile(name, pre_buffer=False)
+            return cls._of_columns(file.schema_arrow, lambda one: file.read([one]).column(0), name)
+
+        made: Self = opened(path, whole)
+        return made
 
     @classmethod
     def read_about(cls, path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -233,7 +239,14 @@ class Estimates:
     @classmethod
     def from_arrow(cls, table: pa.Table, source: str | None = None) -> Self:
         """Convert an Arrow table of estimates; raises InputError if columns are missing or of another type."""
-        missing = [n for n in ("time", "event", "ground_speed") if n not in table.column_names]
+        return cls._of_columns(table.schema, table.column, source)
+
+    @classmethod
+    def _of_columns(
+        cls, schema: pa.Schema, column: Callable[[str], pa.ChunkedArray], source: str | None
+    ) -> Self:
+        """From the columns that ``column`` gives by name."""
+        missing = [n for n in ("time", "event", "ground_speed") if n not in schema.names]
         if missing:
             raise InputError(
                 "is missing, so this is not a table of estimates",
@@ -241,19 +254,19 @@ class Estimates:
                 place=f"column {missing[0]}",
                 hint="give a file written by 'terragrip estimate'",
             )
-        about = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+        about = json.loads((schema.metadata or {}).get(METADATA_KEY, b"{}"))
         notes = tuple(about.pop("notes", ()))
         columns: dict[str, Floats] = {}
         labels: dict[str, npt.NDArray[np.object_]] = {}
-        for name in table.column_names:
+        for name in schema.names:
             if name == "event":
                 continue
-            values = values_of(table.column(name))
+            values = values_of(column(name))
             if values.dtype.kind in "fiu":
                 columns[name] = values.astype(np.float64, copy=False)
             else:
                 labels[name] = np.where(values == None, "", values)  # noqa: E711  (elementwise)
-        return cls(columns.pop("time"), columns, _event_codes(table, source), labels, about, notes)
+        return cls(columns.pop("time"), columns, _event_codes(column("event"), source), labels, about, notes)
 
     @overload
     def summary(self) -> str: ...
@@ -293,8 +306,8 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
         raise unreadable(path, error) from error
 
 
-def _event_codes(table: pa.Table, source: str | None) -> npt.NDArray[np.uint8]:
-    words, codes = codes_of(table.column("event"))
+def _event_codes(events: pa.ChunkedArray, source: str | None) -> npt.NDArray[np.uint8]:
+    words, codes = codes_of(events)
     if unknown := [word for word in words if word not in EVENTS]:
         raise InputError(f"there is no event {unknown[0]}", file=source, place="column event")
     return np.array([EVENTS.index(str(word)) for word in words], dtype=np.uint8)[codes]
