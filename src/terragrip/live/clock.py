@@ -6,14 +6,18 @@ or for time to reach it, and is refused without: all behind it would count as la
 or back by as much, the clock has jumped where samples agree on the new lead, and advance, for AGREEMENT seconds: then time
 goes on without the jump. Where samples are known to be lost, stamps are taken as they are: what looks like a jump is the
 hole they left.
+
+Drift: delays only lower the lead, so a clock shows in the greatest leads of a while (Moon, Skelly and Towsley, INFOCOM 1999), after what
+was corrected so far. Greater than before may be a clock that gains or a network that became faster, less a clock that loses or a slower
+one: both are followed no faster than crystals drift. Greater than 0 is certain: nothing arrives before it was measured.
 """
 
 from __future__ import annotations
 
+from bisect import insort
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from terragrip.live.drift import Drift
 from terragrip.live.outputs import Values
 
 AHEAD = 1.0  # s
@@ -24,6 +28,12 @@ SYNCHRONISED = -1.0, 0.02  # s: first leads in which a source counts as on the m
 LATE = 2.0  # s of arrivals, all behind rows already released, after which that is reported
 _WAITING = 5000
 _MARKS, _APART, _TOO_FAST = 4, 0.5, 50.0  # of `Pace`: marks, s between them, s a second
+
+BLOCK = 10.0  # s of arrivals that are judged together
+RATE = 2e-4  # s in a second: two crystals, 100 ppm each
+_FRESHEST = 3  # the least of so many counts, so that two wild stamps do not
+_LEAST = 1e-3  # s that are worth a correction
+_REPORTED = 0.02  # s
 
 Stamped = tuple[float, float, Values]  # arrival, time (or stamp while waiting), values
 
@@ -44,6 +54,59 @@ class Pace:
         pairs = zip(self.marks, self.marks[1:], strict=False)
         paces = [(later[1] - one[1]) / (later[0] - one[0]) for one, later in pairs]
         return paces[-1] if min(paces) > _TOO_FAST and max(paces) < 2 * min(paces) else None
+
+
+@dataclass(slots=True)
+class Drift:
+    """How a clock runs, by its freshest samples: what drifts is followed, what is behind is set.
+
+    ``usual`` [s]: the lead that is kept, as transport takes some time; None during the first block.
+    """
+
+    usual: float | None = None
+    start: float = 0.0  # arrival of the block's first sample
+    leads: list[float] = field(default_factory=list)  # the block's greatest, ascending
+    total: float = 0.0  # s corrected
+    reported: float = _REPORTED  # s of `total` that are next worth an event
+
+    def correction(self, arrival: float, lead: float) -> float:
+        """What stamps are to be corrected by from the next sample on [s]: 0 but at a block's end."""
+        if not self.leads:
+            self.start = arrival
+        insort(self.leads, lead)
+        del self.leads[:-_FRESHEST]
+        span = arrival - self.start
+        if span < BLOCK:
+            return 0.0
+        freshest, self.leads = self.leads[0], []
+        if self.usual is None:
+            self.usual = min(freshest, 0.0)
+        step = self.usual - freshest
+        if freshest <= 0.0:
+            step = max(-RATE * span, min(step, RATE * span))
+        if abs(step) < _LEAST:
+            return 0.0
+        self.total += step
+        return step
+
+    def behind(self) -> float:
+        """s that the samples since `restart` are behind the usual lead, now corrected: all of them came too late."""
+        if self.usual is None:
+            self.usual = 0.0
+        step = self.usual - self.leads[0]
+        self.restart()
+        return step
+
+    def restart(self) -> None:
+        """Begin a block: earlier leads say nothing of the coming ones."""
+        self.leads = []
+
+    def is_news(self) -> bool:
+        """Whether the drift has become worth an event: at 20 ms, and where it has doubled."""
+        if abs(self.total) < self.reported:
+            return False
+        self.reported = 2.0 * abs(self.total)
+        return True
 
 
 @dataclass(slots=True)

@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from terragrip.estimation.engine_estimator import restored
 from terragrip.live.core import Core
 from terragrip.live.decode import Decoder
 from terragrip.live.feed import Feed
@@ -18,17 +19,19 @@ from terragrip.live.outbox import Outbox
 from terragrip.live.outputs import Event, Output, Refusal, Row
 from terragrip.live.payload import unpacker
 from terragrip.live.pipeline import Pipeline
-from terragrip.live.prediction import Prediction
 from terragrip.live.record import SECONDS
 from terragrip.live.statistics import Statistics
 from terragrip.log_events import emit
 
 if TYPE_CHECKING:
+    from terragrip.estimation.estimator import TractionEstimator
     from terragrip.formats import Profile
     from terragrip.live.setpoint import LiveSetpoint
 
 AT_ONCE = 64  # samples between two turns of sources and sinks
 _SYNC = 0.7  # s: with writing, under a second
+_PATIENCE = 0.3  # s of silence before rows are predicted, or
+_PERIODS = 5.0  # rows' periods
 
 logger = logging.getLogger("terragrip.live")
 
@@ -160,3 +163,32 @@ class VehicleRun:
         message = Message(kind, time, row, data, self.name)
         for listener in self.listeners:
             listener(message)
+
+
+class Prediction:
+    """Rows while nothing comes in, with growing intervals: at most one a call, and none after ``longest`` s of silence.
+
+    They are made on a copy: the filter itself does not move, and samples that were only delayed find it as if nothing had happened.
+    """
+
+    def __init__(self, longest: float = float("inf")) -> None:
+        self._longest = longest
+        self._copy: TractionEstimator | None = None
+        self._rows, self._time = -1, float("-inf")
+
+    def at(self, core: Core, now: float, last_arrival: float, period: float) -> Row | None:
+        """The row at the arrival clock's ``now``, or None: nothing came yet, or something came just now."""
+        silence = now - last_arrival
+        if core.estimator is None or not core.rows or silence < max(_PATIENCE, _PERIODS * period):
+            return None
+        if silence > self._longest:
+            self._copy = None
+            return None
+        if self._copy is None or self._rows != core.rows:
+            self._copy, self._rows = restored(core.estimator.snapshot()), core.rows
+            self._time = core.time
+        time = core.time + silence
+        if time <= self._time:  # what came meanwhile was no row: the silence counts anew
+            return None
+        self._time = time
+        return Row(now, {}, self._copy.update({"time": time}), predicted=True)
