@@ -38,14 +38,15 @@ class Pipeline:
 
     def process(self, arrival: float, source: int, stamp: float, values: Values) -> list[Output]:
         """See `Core.process`."""
-        return self._handle("S", (arrival, source, stamp, values))
+        outputs = self.core.process(arrival, source, stamp, values)
+        return self._kept(outputs, "S", (arrival, source, stamp, values))
 
     def tick(self, now: float) -> list[Output]:
         """See `Core.tick`; nothing, and nothing recorded, where it would do nothing."""
         until = self.waiting_until
         if until is None or now < until:
             return []
-        return self._handle("T", now)
+        return self._kept(self.core.tick(now), "T", now)
 
     @property
     def waiting_until(self) -> float | None:
@@ -55,23 +56,22 @@ class Pipeline:
 
     def note(self, note: dict[str, Any]) -> list[Output]:
         """See `Core.note`."""
-        return self._handle("N", note)
+        return self._kept(self.core.note(note), "N", note)
 
     def flush(self) -> list[Output]:
         """See `Core.flush`."""
-        return self._handle("F", None)
+        return self._kept(self.core.flush(), "F", None)
 
-    def _handle(self, kind: str, content: Any) -> list[Output]:
-        outputs = self.core.handle(kind, content)
-        return self._keep(outputs, lambda recorder: recorder.keep(outputs, kind, content))
+    def _kept(self, outputs: list[Output], kind: str, content: Any) -> list[Output]:
+        return self._recorded(outputs, lambda recorder: recorder.keep(outputs, kind, content))
 
     def write(self) -> list[Output]:
         """Hand what came in to the system, after which a kill cannot lose it."""
-        return self._keep([], Recorder.write)
+        return self._recorded([], Recorder.write)
 
     def sync(self) -> list[Output]:
         """Have it put on the disk."""
-        return self._keep([], Recorder.sync)
+        return self._recorded([], Recorder.sync)
 
     def close(self) -> None:
         """Close the record whole."""
@@ -90,7 +90,7 @@ class Pipeline:
             self.recorder.abandon()
             self.recorder = None
 
-    def _keep(self, outputs: list[Output], keep: Callable[[Recorder], None]) -> list[Output]:
+    def _recorded(self, outputs: list[Output], keep: Callable[[Recorder], None]) -> list[Output]:
         """Record it; where that is not possible, say so and go on without."""
         if self.recorder is None:
             return outputs
