@@ -4,25 +4,13 @@
 /* A pull at the hitch that nothing measures reads as soil resistance, and the load that it moves between the axles is not known. */
 static int32_t pull_is_unseen(const tg_settings *s) { return !s->towing && s->hitch_height > 0 && s->axles > 1; }
 
-/* How many columns these spreads need: constants without a spread need none. */
-int32_t tgi_deviation_columns(const tg_settings *s)
-{
-    const tg_uncertainty *u = &s->uncertainty;
-    int32_t columns = 0;
-    if (u->drive_torque_gain > 0 || u->drive_torque_offset > 0)
-        for (int32_t i = 0; i < s->machine.wheels; i++) columns += s->driven[i] != 0;
-    return columns + (u->drive_torque_gain_common > 0) + (u->drawbar_gain > 0 || u->drawbar_offset > 0) + (u->slope > 0)
-         + (u->tire_rolling_resistance > 0) + (u->vertical_load > 0 || pull_is_unseen(s)) + (u->mass > 0 || s->weighed) + (s->carrying != 0)
-         + (u->acceleration_bias > 0);
-}
-
 /* Column k: wheel i carries `gain[i]` more. Returns the force that this adds to the vehicle. */
 static tg_real add_loads(const tg_estimator *e, const tg_real *mu, const tg_real *gain, tg_deviations *d, int32_t k)
 {
     const tg_machine *m = &e->settings.machine;
     tg_real force = 0;
     for (int32_t i = 0; i < m->wheels; i++) {
-        d->wheel_acceleration[i][k] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain[i] * e->constants.inverse_inertia[i];
+        d->wheel_acceleration[i][k] = -m->radius[i] * (mu[i] + m->tire_rolling_resistance) * gain[i] * e->filter.inverse_inertia[i];
         force += mu[i] * gain[i];
     }
     return force;
@@ -80,15 +68,15 @@ static tg_real slope_spread(const tg_estimator *e)
     return e->pitch.count == 0 ? 0 : found < given ? found : given;
 }
 
-/* Work out e->deviations, a column for each constant in the order of tgi_deviation_columns; `u` are the inputs along the travel, `mu`
- * adhesion and rho_s. What a constant does not touch stays 0 from the start. */
-void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
+/* Work out e->deviations, a column for each constant that has a spread; returns how many, which the settings alone decide. `u` are the inputs
+ * along the travel, `mu` adhesion and rho_s. What a constant does not touch stays 0 from the start. */
+int32_t tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
 {
     const tg_settings *s = &e->settings;
     const tg_uncertainty *spread = &s->uncertainty;
-    const tg_real *inverse_inertia = e->constants.inverse_inertia;
+    const tg_real *inverse_inertia = e->filter.inverse_inertia;
     const int32_t n = s->machine.wheels;
-    const tg_real mass = u->mass > 0 ? u->mass : s->machine.mass, inverse_mass = u->mass > 0 ? 1 / u->mass : e->constants.inverse_mass;
+    const tg_real mass = u->mass > 0 ? u->mass : s->machine.mass, inverse_mass = u->mass > 0 ? 1 / u->mass : e->filter.inverse_mass;
     tg_deviations *d = &e->deviations;
     int32_t k = 0;
     if (spread->drive_torque_gain > 0 || spread->drive_torque_offset > 0)
@@ -118,6 +106,7 @@ void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
     if (s->carrying) add_hitch_load(e, inverse_mass, mu, d, k++);
     if (spread->acceleration_bias > 0) {
         d->accelerometer[k] = -spread->acceleration_bias;
-        d->acceleration[k] = e->slope.running ? -spread->acceleration_bias : 0; /* it is in the slope, see slope.c */
+        d->acceleration[k++] = e->slope.running ? -spread->acceleration_bias : 0; /* it is in the slope, see slope.c */
     }
+    return k;
 }

@@ -46,17 +46,12 @@ static void signals_of(const tg_estimator *e, const tgi_view *l, tg_real *now)
     now[TGI_TRAVEL] = tgi_log((l->travel > 0 ? l->travel : 0) + still);
 }
 
+/* A view is nothing but reals. */
 static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
 {
-    sum->slip += weight * l->slip;
-    sum->deviation += weight * l->deviation;
-    sum->leading += weight * l->leading;
-    sum->trailing += weight * l->trailing;
-    sum->resistance += weight * l->resistance;
-    sum->adhesion_deviation += weight * l->adhesion_deviation;
-    sum->resistance_deviation += weight * l->resistance_deviation;
-    sum->rim += weight * l->rim;
-    sum->travel += weight * l->travel;
+    tg_real *const to = (tg_real *)sum;
+    const tg_real *const from = (const tg_real *)l;
+    for (size_t k = 0; k < sizeof *sum / sizeof *to; k++) to[k] += weight * from[k];
 }
 
 /* Where a machine works at much slip, that is soon usual, and stays so over its turns and ways between. */

@@ -155,7 +155,7 @@ typedef struct { /* errors of the ground speed that last, see slow_speed.c */
     tg_real expected;       /* variance of the last innovation, which is the SD of such a product of unlike ones */
 } tgi_slow_speed;
 
-typedef struct { /* of the driven wheels, along the travel; see immobilization.c */
+typedef struct { /* of the driven wheels, along the travel; see immobilization.c; all reals */
     tg_real slip, deviation, fastest; /* of the worst wheel of each side, their mean: slip, its SD, rim speed */
     tg_real leading, trailing; /* adhesion of these axles, alike where there is but one */
     tg_real resistance, rim, travel; /* rim: mean of all */
@@ -212,8 +212,6 @@ typedef struct { /* what follows from the settings alone */
     tg_real agility[TG_GROUND_SPEED + 1]; /* rad/s^2, m/s^2: a change of each speed that a vehicle can do */
     tg_real soon[TG_GROUND_SPEED + 1]; /* of each speed, least share of a sample in its low-pass */
     tg_real trust;                  /* in a ground speed against wheels, by its noise */
-    tg_real inverse_inertia[8];
-    tg_real inverse_mass;
     tg_real mean_radius;            /* m */
     tg_real spin_inertia;           /* sum J/r */
     tg_real unknown_torque[8];      /* variance of a torque never seen */
@@ -314,12 +312,11 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 
 /* deviations.c */
-int32_t tgi_deviation_columns(const tg_settings *s);
-void tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu);
+int32_t tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu);
 
 /* settings.c */
 void tgi_believe(tg_estimator *e);
-tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s);
+tg_status tgi_filter_anew(tg_filter *f, const tg_settings *s);
 
 /* slope.c */
 void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise);
@@ -392,9 +389,6 @@ void tgi_digging_report(const tgi_digging *d, tg_real *o);
 /* immobilization.c */
 void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, int32_t moving, int32_t anew, tg_real dt, tg_real *o);
 int32_t tgi_watched(const tg_estimator *e); /* tg_event */
-
-/* speeds_report.c */
-void tgi_speeds_report(const tg_settings *set, const tgi_speeds *s, tg_real *o);
 
 /* speeds.c */
 void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out);

@@ -93,7 +93,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
     l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
     /* Hills are slow; what soil does within metres is no error of its resistance, but no digging either. */
     /* A pull that no cell measures counts as one that stays: it is in no rise. */
-    const tg_real pull = s->towing ? 0 : s->uncertainty.drawbar_offset * e->constants.inverse_mass / s->machine.gravity;
+    const tg_real pull = s->towing ? 0 : s->uncertainty.drawbar_offset * e->filter.inverse_mass / s->machine.gravity;
     const tg_real known = tgi_square(o[TG_OUT_SOIL_RESISTANCE_STD]) - tgi_square(pull) - e->scene.unseen_grade - e->scene.bumps;
     l.resistance_deviation = tgi_sqrt(tgi_max(known, 0) + e->roughness.wander);
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];

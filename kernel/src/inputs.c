@@ -189,9 +189,9 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i]) {
-            row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(c->inverse_inertia[i]);
+            row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(e->filter.inverse_inertia[i]);
             q[i] += held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
-                 * tgi_square(c->inverse_inertia[i]);
+                 * tgi_square(e->filter.inverse_inertia[i]);
         }
     if (e->drawbar.count > 0 || s->towing) {
         row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(drive->inverse_mass);

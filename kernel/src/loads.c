@@ -22,7 +22,7 @@ void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive)
     const tg_settings *s = &e->settings;
     const tg_real mass = s->machine.mass, weight = mass * s->machine.gravity;
     drive->mass = mass;
-    drive->inverse_mass = e->constants.inverse_mass;
+    drive->inverse_mass = e->filter.inverse_mass;
     if (s->weighed) bounded_input(e, &e->mass, row, TG_MASS, TG_LEAST_MASS * mass, TG_MOST_MASS * mass);
     if (s->carrying) bounded_input(e, &e->hitch_load, row, TG_HITCH_LOAD, TG_LEAST_HITCH * weight, TG_MOST_HITCH * weight);
     if (e->mass.count > 0) {

@@ -13,7 +13,8 @@ void tgi_follow(tg_estimator *e, const tg_deviations *deviations)
 /* A filter that diverged starts again from the priors. */
 void tgi_forget(tg_estimator *e)
 {
-    tgi_filter_anew(&e->filter, &e->consider, &e->settings);
+    tgi_filter_anew(&e->filter, &e->settings);
+    tg_consider_init(&e->consider, &e->filter, e->belief.columns);
     if (e->track) tg_track_init(e->track, &e->filter);
     e->scene.anew = 1;
 }

@@ -260,7 +260,6 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     }
     for (int32_t i = 0; i < m->wheels; i++) {
         const tg_real load = s->load_share[s->wheel_axle[i]] * s->wheel_share[i] * weight;
-        c->inverse_inertia[i] = 1 / m->inertia[i];
         c->agility[i] = s->tuned.agility * m->gravity / s->rolling_radius[i];
         c->soon[i] = soon(s->standstill_speed / s->rolling_radius[i], s->noise[TG_WHEEL_SPEED + i]);
         c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
@@ -274,12 +273,11 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     const tg_real T = natural_time(m);
     c->force_walk = force_walk(s);
     c->mounting_walk = s->tuned.mounting_walk / T;
-    c->inverse_mass = 1 / m->mass;
     c->pace = tgi_pace(s);
     place_wheels(s, c);
     tgi_place_trends(s, c);
     c->unknown_pull = tgi_square(s->tuned.unknown_pull * weight);
-    c->least_shock = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(c->inverse_mass);
+    c->least_shock = c->variance[TG_ACCELERATION_X] + c->variance[TG_DRAWBAR_FORCE] * tgi_square(1 / m->mass);
     tg_real low = s->tuning.scales[0], high = low;
     for (int32_t b = 1; b < TG_MODES; b++) {
         if (s->tuning.scales[b] < low) low = s->tuning.scales[b];
@@ -288,8 +286,8 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
     for (int32_t b = 0; b < TG_MODES && high > low; b++) c->scale_score[b] = tgi_log(s->tuning.scales[b] / low) / tgi_log(high / low);
 }
 
-/* A filter with the priors only, and its considered columns. */
-tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s)
+/* A filter with the priors only. */
+tg_status tgi_filter_anew(tg_filter *f, const tg_settings *s)
 {
     const int32_t n = s->machine.wheels, nx = 2 * n + 2;
     tg_real x[TG_MAX_STATES] = {0}, P[TG_MAX_STATES * TG_MAX_STATES] = {0};
@@ -301,8 +299,7 @@ tg_status tgi_filter_anew(tg_filter *f, tg_consider *c, const tg_settings *s)
     P[n * (nx + 1)] = 1;
     x[nx - 1] = s->prior_resistance;
     P[(nx - 1) * (nx + 1)] = tgi_square(s->prior_resistance_std);
-    tg_status status = tg_filter_init(f, &s->machine, &s->tuning, x, P);
-    return status == TG_OK ? tg_consider_init(c, f, tgi_deviation_columns(s)) : status;
+    return tg_filter_init(f, &s->machine, &s->tuning, x, P);
 }
 
 /* The filter's moments as the belief. */
@@ -332,13 +329,12 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     if (!e || !settings) return TG_BAD_ARGUMENT;
     tg_status status = check(settings);
     if (status != TG_OK) return status;
-    status = tgi_filter_anew(&e->filter, &e->consider, settings); /* which changes nothing where it fails */
+    status = tgi_filter_anew(&e->filter, settings); /* which changes nothing where it fails */
     if (status != TG_OK) return status;
     memset(e, 0, offsetof(tg_estimator, consider));
     e->track = NULL;
     e->settings = *settings;
     if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
-    e->belief.columns = tgi_deviation_columns(settings);
     e->direction = 1;
     e->yaw_time = -(double)INFINITY;
     work_out_constants(&e->settings, &e->constants);
@@ -348,6 +344,9 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
     tgi_reset_curves(e);
     tgi_believe(e);
+    const tg_input rest = {.load = {0}};
+    e->belief.columns = tgi_deviations(e, &rest, e->belief.x);
+    tg_consider_init(&e->consider, &e->filter, e->belief.columns);
     return TG_OK;
 }
 

@@ -1,7 +1,7 @@
 /* Slip of wheels from their speeds and their hubs'. */
 #ifndef TG_SLIP_H
 #define TG_SLIP_H
-#include "model.h"
+#include "filter.h"
 
 typedef struct { /* of four wheels: slip, and its change with omega, v and the relative radius */
     tg_lanes slip, wheel, ground, radius;
