@@ -33,7 +33,7 @@ PROFILE = {
         "drawbar_force": {"from": "nowhere", "else": {"norm_of": ["px", "py"], "unit": "kN"}},
         "hitch_load": {"sum_of": {"px": 2.0, "py": -0.5}, "unit": "kN", "invalid": [[60, 100]]},
         "altitude": {"from": "gone", "optional": True},
-        "acceleration_z": {"constant": 9.81},
+        "acceleration_z": {"constant": 9.81, "sign": -1},
     },
 }
 
@@ -108,6 +108,8 @@ def test_nanoseconds_since_1970_keep_their_digits():
         )
     )
     first = 1_700_000_000_123_456_789
+    for wrong in (math.nan, 10**400, True):  # the first stamp is the first number
+        assert decoder.samples({"ns": wrong, "v": 1.0}) == [(None, {"ground_speed": 1.0})]
     stamps = [decoder.samples({"ns": first + 1000 * k, "v": 1.0})[0][0] for k in range(3)]
     assert stamps == pytest.approx([0.0, 1e-6, 2e-6], abs=1e-12)
 

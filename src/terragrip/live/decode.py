@@ -7,10 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from terragrip.errors import InputError
 from terragrip.estimation.rims import speeds_alone
+from terragrip.formats.derivation import pitch_of, roll_of
 from terragrip.formats.profile import Profile
-from terragrip.formats.profile_parts import Source, matching
+from terragrip.formats.profile_parts import Source, TimeSource, matching
 from terragrip.live.outputs import Values
 from terragrip.recording.schema import LABELS, REFERENCE, TIME, is_channel, unit_of
 from terragrip.units import factor_to, quantity
@@ -21,11 +24,8 @@ if TYPE_CHECKING:
 Sample = tuple[float | None, Values]
 """Stamp [s] on the source's clock, None where the message has none; and values."""
 
-_HUGE = 1e300
 _NAMES = 1000  # of fields, beyond which a sender makes them up
 _SPARE = 0.02  # s between a delay and the window that is advised for it
-
-
 _LAYOUTS = 256  # sets of fields whose plan is kept
 
 Read = Callable[[Mapping[str, Any]], float | None]
@@ -52,26 +52,24 @@ class Decoder:
         self.profile = profile
         self.units: dict[str, str] = {}
         self.unreadable: dict[str, str] = {}
-        self._known: dict[str, bool] = {}
-        self._time, self._zero = TIME, False
-        self._first: int | float | None = None
-        self._factor = 1.0
+        self._stamps = TimeSource.model_validate({}) if profile is None else profile.time
+        self._tick = factor_to(self._stamps.unit, "s")
+        self._first: Any = None
         self._plans: dict[tuple[str, ...], list[_Step]] = {}
         self._best: dict[str, tuple[int, int]] = {}
-        self._divisors: dict[str, Any] = {}
         self._sources: dict[str, Source] = {}
         if profile is not None:
-            self._time, self._zero = profile.time.column, profile.time.zero == "first"
-            self._factor = factor_to(profile.time.unit, "s")
             self._sources = {name: one for name, one in profile.channels.items() if name not in LABELS}
             for name, source in self._sources.items():
                 _refuse_looking_ahead(name, source)
-                self._divisors |= {one.over: None for one in source.chain if one.over is not None}
+        every = (one for source in self._sources.values() for one in source.chain)
+        self._divisors: dict[str, Any] = {one.over: None for one in every if one.over is not None}
 
     @property
     def channels(self) -> tuple[str, ...]:
         """The columns a profile promises; none without one."""
-        return tuple(name for name, source in self._sources.items() if not source.optional)
+        promised = {} if self.profile is None else self._sources
+        return tuple(name for name, source in promised.items() if not source.optional)
 
     def wants(self, name: str) -> bool:
         """Whether the profile names a field."""
@@ -82,9 +80,7 @@ class Decoder:
 
         ``arrival`` [s]: its stamp, where it holds none.
         """
-        if self.profile is None:
-            return self._plain(fields)
-        rows = self.profile.rows
+        rows = None if self.profile is None else self.profile.rows
         if rows is not None and fields.get(rows.column) != rows.equals:
             return []
         layout = tuple(fields)
@@ -110,61 +106,36 @@ class Decoder:
 
     def _plan(self, layout: tuple[str, ...]) -> list[_Step]:
         """What messages of these fields give: of each channel's ways the first whose fields are all there."""
-        plan = []
-        for name, source in self._sources.items():
-            result = next(
-                (step for k, one in enumerate(source.chain) if (step := self._step(name, k, one, layout))),
-                None,
-            )
-            if result is not None:
-                plan.append(result)
+        if self.profile is None:
+            ours = [name for name in layout if _is_ours(name) and name not in self._sources]
+            self._sources |= {
+                n: Source.model_validate({"from": n}) for n in ours[: _NAMES - len(self._sources)]
+            }
+        steps = (self._step(name, source, layout) for name, source in self._sources.items())
+        plan = [step for step in steps if step is not None]
         if len(self._plans) < _LAYOUTS:
             self._plans[layout] = plan
         return plan
 
-    def _step(self, name: str, place: int, source: Source, layout: tuple[str, ...]) -> _Step | None:
-        if source.constant is not None:
-            constant = quantity(source.constant, unit_of(name) or "1")
-            return _Step(name, source.delay, (place, 0), lambda fields: constant)
-        several = source.norm_of or source.sum_of or source.pitch_of or source.roll_of
-        if several is not None:
-            columns = [next(iter(matching(column, layout)), None) for column in several]
-            if None in columns:
-                return None
-            return _Step(
-                name, source.delay, (place, 0), self._vector(name, source, [str(c) for c in columns])
-            )
-        for rank, candidate in enumerate(source.candidates):
-            column = next(iter(matching(candidate, layout)), None)
-            if column is not None:
-                return _Step(name, source.delay, (place, rank), self._scaled(name, source, column))
+    def _step(self, name: str, origin: Source, layout: tuple[str, ...]) -> _Step | None:
+        for place, source in enumerate(origin.chain):
+            for rank, way in enumerate(_ways(source)):
+                columns = [column for one in way for column in matching(one, layout)[:1]]
+                if len(columns) == len(way):
+                    return _Step(name, source.delay, (place, rank), self._reader(name, source, columns))
         return None
 
-    def _plain(self, fields: Mapping[str, Any]) -> list[Sample]:
-        values: Values = {}
-        known = self._known
-        for name, raw in fields.items():
-            ours = known.get(name)
-            if ours is None:
-                ours = _is_ours(name) and len(known) < _NAMES
-                if len(known) < _NAMES:
-                    known[name] = ours
-            if ours:
-                value = raw if type(raw) is float and -_HUGE < raw < _HUGE else self._number(name, raw)
-                if value is not None:
-                    values[name] = value
-        return [(self._stamp(fields), values)] if values else []
-
     def _stamp(self, fields: Mapping[str, Any]) -> float | None:
-        raw = fields.get(self._time)
-        if raw is None:
-            return None
-        if self._zero and isinstance(raw, int | float):
-            if self._first is None:
-                self._first = raw
-            raw = raw - self._first  # in integers while they are: nanoseconds since 1970 need all 64 bits
+        raw = fields.get(self._stamps.column)
         stamp = self._number(TIME, raw)
-        return None if stamp is None else stamp * self._factor
+        if stamp is None:
+            return None
+        if self._stamps.zero:
+            self._first = raw if self._first is None else self._first
+            stamp = float(
+                raw - self._first
+            )  # in integers while they are: nanoseconds since 1970 need all 64 bits
+        return stamp * self._tick
 
     def _number(self, name: str, raw: Any) -> float | None:
         """A finite number, or None: missing where it is None or NaN, noted where it is anything else."""
@@ -182,68 +153,65 @@ class Decoder:
             return None
         return None if value != value else value
 
-    def _gain(self, name: str, source: Source, column: str | None) -> tuple[float, float]:
+    def _gain(self, name: str, source: Source, columns: list[str]) -> tuple[float, float]:
         """Factor and offset from a field's number to SI: by the profile's unit, else by the one that the source states."""
         unit = source.unit
-        if unit is None and source.scale == 1.0 and source.over is None and column is not None:
-            unit = self.units.get(column)
-        factor = factor_to(unit, unit_of(name) or "1") if unit else 1.0
-        return source.gain(factor)
+        if (
+            unit is None
+            and source.scale == 1.0
+            and source.over is None
+            and columns
+            and self.profile is not None
+        ):
+            unit = self.units.get(columns[0])
+        return source.gain(factor_to(unit, unit_of(name) or "1") if unit else 1.0)
 
-    def _scaled(self, name: str, source: Source, column: str) -> Read:
-        gain, offset = self._gain(name, source, column)
-        over, least = source.over, source.over_minimum
-        bad = [item if isinstance(item, tuple) else (item, item) for item in source.invalid]
-        plain = not bad and over is None
+    def _reader(self, name: str, source: Source, columns: list[str]) -> Read:
+        """What gives a channel's value of a message that has these fields."""
+        gain, offset = self._gain(name, source, columns)
+        value_of, over = _combination(name, source), source.over
+        checked = source.invalid if source.candidates or source.sum_of else ()
+        bad = [item if isinstance(item, tuple) else (item, item) for item in checked]
 
         def read(fields: Mapping[str, Any]) -> float | None:
-            raw = fields.get(column)
-            if raw is None:
+            parts = [
+                part for column in columns if (part := self._number(name, fields.get(column))) is not None
+            ]
+            if len(parts) < len(columns) or any(low <= part <= high for part in parts for low, high in bad):
                 return None
-            value = self._number(name, raw)
-            if plain or value is None:
-                return None if value is None else gain * value + offset
-            if any(low <= value <= high for low, high in bad):
-                return None
+            value = value_of(parts)
             if over is not None:
                 divisor = self._number(name, fields.get(over, self._divisors[over]))
-                if divisor is None or abs(divisor) < least:
+                if divisor is None or abs(divisor) < source.over_minimum:
                     return None
                 value /= divisor
-            return gain * value + offset
-
-        return read
-
-    def _vector(self, name: str, source: Source, columns: list[str]) -> Read:
-        """The size of a vector, a sum, or the pitch or roll of a quaternion."""
-        import numpy as np
-
-        from terragrip.formats.derivation import pitch_of, roll_of
-
-        gain, offset = self._gain(name, source, columns[0])
-
-        def read(fields: Mapping[str, Any]) -> float | None:
-            parts = [self._number(name, fields.get(column)) for column in columns]
-            numbers = [part for part in parts if part is not None]
-            if len(numbers) < len(parts):
-                return None
-            if source.norm_of is not None:
-                value = math.sqrt(
-                    sum(number * number for number in numbers)
-                )  # hypot rounds otherwise than a file's columns
-            elif source.sum_of is not None:
-                bad = [item if isinstance(item, tuple) else (item, item) for item in source.invalid]
-                if any(low <= number <= high for number in numbers for low, high in bad):
-                    return None
-                value = sum(
-                    factor * number for factor, number in zip(source.sum_of.values(), numbers, strict=True)
-                )
-            else:
-                angle = pitch_of if source.pitch_of is not None else roll_of
-                value = float(angle([np.array([number]) for number in numbers])[0])
             return None if value != value else gain * value + offset
 
         return read
+
+
+def _ways(source: Source) -> list[tuple[str, ...]]:
+    """The fields, or patterns of them, that a source can be had from: one of several, or some together; none of a constant."""
+    together = source.norm_of or source.sum_of or source.pitch_of or source.roll_of
+    if together is not None or source.constant is not None:
+        return [tuple(together or ())]
+    return [(candidate,) for candidate in source.candidates]
+
+
+def _combination(name: str, source: Source) -> Callable[[list[float]], float]:
+    """From the numbers of a source's fields to one: the size of a vector, a sum, the pitch or roll of a quaternion, or the only one."""
+    if source.constant is not None:
+        constant = quantity(source.constant, unit_of(name) or "1")
+        return lambda parts: constant
+    if source.norm_of is not None:  # hypot rounds otherwise than a file's columns
+        return lambda parts: math.sqrt(sum(part * part for part in parts))
+    if source.sum_of is not None:
+        factors = tuple(source.sum_of.values())
+        return lambda parts: sum(factor * part for factor, part in zip(factors, parts, strict=True))
+    if source.candidates:
+        return lambda parts: parts[0]
+    angle = pitch_of if source.pitch_of is not None else roll_of
+    return lambda parts: float(angle([np.array([part]) for part in parts])[0])
 
 
 def _is_ours(name: str) -> bool:
