@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_long import long_matlab
@@ -24,13 +23,13 @@ from terragrip.formats.matlab_signals import Contents, matrices_with_time, secon
 from terragrip.formats.matlab_values import Array, Opaque, read_array
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
-from terragrip.formats.table import LogTable, Wanted
+from terragrip.formats.table import LogTable, Sparse, Wanted
 from terragrip.formats.worker import Reading, UnreadableError, Worker
 
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
 
-def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog | LogTable:
+def read_matlab(path: str, wanted: Wanted, databases: Databases) -> SignalLog | LogTable:
     """Read a MATLAB file; raises InputError if it is damaged, or holds no numeric column."""
     if not is_hdf5(path):
         return _by_matio(path, wanted)
@@ -42,20 +41,22 @@ def read_matlab(path: str, wanted: Wanted | None, databases: Databases) -> Signa
                 return _by_matio(path, wanted)
             except UnreadableError:
                 pass  # the notes name what is left
-        contents = _contents(tree, path, wanted is None)
+        contents = _contents(tree, path, isinstance(wanted, Sparse))
         outline = _outline(contents)
-        return _log(outline, _samples(contents, _chosen(outline, wanted)), path, wanted)
+        return _log(outline, _samples(contents, _chosen(outline, wanted)), wanted)
 
 
-def _chosen(outline: _Outline, wanted: Wanted | None) -> list[str]:
-    return [name for name in outline.names if wanted is None or wanted(name)]
+def _chosen(outline: _Outline, wanted: Wanted) -> list[str]:
+    return [name for name in outline.names if wanted(name)]
 
 
-def _by_matio(path: str, wanted: Wanted | None) -> SignalLog | LogTable:
-    with Worker("terragrip.formats.matlab:items_of", "matio", path, "MATLAB file", wanted is None) as worker:
+def _by_matio(path: str, wanted: Wanted) -> SignalLog | LogTable:
+    with Worker(
+        "terragrip.formats.matlab:items_of", "matio", path, "MATLAB file", isinstance(wanted, Sparse)
+    ) as worker:
         outline = worker.receive()
         worker.send(_chosen(outline, wanted))
-        return _log(outline, worker, path, wanted)
+        return _log(outline, worker, wanted)
 
 
 def items_of(path: str, first_run: bool) -> Reading:
@@ -144,13 +145,11 @@ def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samp
         yield Samples(name, id(clock), np.asarray(flat, dtype=np.float64), contents.units.get(name))
 
 
-def _log(
-    outline: _Outline, items: Iterable[Clock | Samples], path: str, wanted: Wanted | None
-) -> SignalLog | LogTable:
+def _log(outline: _Outline, items: Iterable[Clock | Samples], wanted: Wanted) -> SignalLog | LogTable:
     if not outline.is_table:
-        return SignalLog(outline.names, signals_of(items, wanted), path, sha256(path), outline.notes)
+        return SignalLog(outline.names, signals_of(items, wanted), notes=outline.notes)
     columns = {one.name: one.values for one in items if isinstance(one, Samples)}
-    return LogTable(outline.names, columns, {}, path, sha256(path), outline.notes)
+    return LogTable(outline.names, columns, notes=outline.notes)
 
 
 def _notes(contents: Contents) -> list[str]:

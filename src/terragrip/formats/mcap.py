@@ -17,7 +17,7 @@ from terragrip.formats.table import Wanted
 _EPOCH = ("timestamp", "stamp", "time")
 
 
-def read_mcap(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_mcap(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Read an MCAP file by topic and field; raises InputError if it is damaged from the start, or nothing can be read.
 
     A file that was cut off is read as far as it goes, and so is one of which some chunks are damaged.
@@ -28,7 +28,7 @@ def read_mcap(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     return log_of(topics.values(), path, [*types.notes(), *notes])
 
 
-def collect(file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: Types) -> list[str]:
+def collect(file: Path, wanted: Wanted, topics: dict[str, Topic], types: Types) -> list[str]:
     """Read the messages of one file into their topics; returns sentences on what could not be read."""
     exceptions, kinds = needed("mcap.exceptions", "an MCAP file"), needed("mcap.records", "an MCAP file")
     notes: list[str] = []

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.files import sha256
 from terragrip.formats.can.catalog import EXTENDED, catalog
 from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
@@ -26,7 +26,7 @@ _BUS_EVENT = 2  # flag of a channel group that holds frames (ASAM MDF 4)
 _FRAME = "CAN_DataFrame"
 
 
-def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_mdf(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Read an MDF file; raises InputError if it is damaged, or holds neither signals nor known frames."""
     frames = Frames(catalog(databases), wanted)
 
@@ -39,12 +39,12 @@ def read_mdf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLo
 
     with Worker("terragrip.formats.mdf:items_of", "asammdf", path, "MDF file") as worker:
         names = worker.receive()
-        worker.send([name for name in names if wanted is None or wanted(name)])
+        worker.send([name for name in names if wanted(name)])
         signals = signals_of(without_frames(worker), wanted)
     if not frames.count:
-        return SignalLog(names, signals, path, sha256(path))
+        return SignalLog(names, signals)
     log = finished(frames, path, (), databases, refuse_unknown=not signals)
-    return SignalLog((*names, *log.names), signals | log.signals, path, log.sha256, log.notes)
+    return replace(log, names=(*names, *log.names), signals=signals | log.signals)
 
 
 def items_of(path: str) -> Reading:

@@ -18,7 +18,7 @@ from terragrip.errors import InputError
 from terragrip.files import sha256
 from terragrip.formats.boundary import DAMAGE
 from terragrip.formats.signals import Signal, SignalLog
-from terragrip.formats.table import Wanted, skips
+from terragrip.formats.table import EVERY, Wanted, skips
 
 _LONGEST_ARRAY = 16  # numbers of a list beyond which none is a signal
 _LONGEST_LIST = 8  # messages of a list beyond which none is one
@@ -117,7 +117,7 @@ class Topic:
     """
 
     name: str
-    wanted: Wanted | None = None
+    wanted: Wanted = EVERY
     names: dict[str, None] = field(default_factory=dict)
     count: int = 0
     bad: int = 0
@@ -145,7 +145,7 @@ class Topic:
         for name, value in fields.items():
             if name not in self.names:
                 self.names[name] = None
-                if self.wanted is None or self.wanted(name):
+                if self.wanted(name):
                     self._columns[name] = _Column(isinstance(value, str))
         if self._columns:
             self._receipts.append(receipt)
@@ -210,5 +210,5 @@ def log_of(topics: Iterable[Topic], path: str, notes: list[str], files: Iterable
         raise InputError(
             f"{problem}{'; ' + remarks[0] if remarks else ''}", file=path, hint="check how it was recorded"
         )
-    digest = "+".join(sha256(file) for file in files) or sha256(path)
-    return SignalLog(tuple(names), result, path, digest, tuple(remarks))
+    digest = "+".join(sha256(file) for file in files) or None
+    return SignalLog(tuple(names), result, sha256=digest, notes=tuple(remarks))

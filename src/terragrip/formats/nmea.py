@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.formats.can.text_logs import lines_are_like
 from terragrip.formats.nmea_sentences import UNITS, Sentence, sentences
 from terragrip.formats.registry import Databases, Format
@@ -63,7 +62,7 @@ class _Track:
         self.now = base + seconds
 
 
-def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_nmea(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Read an NMEA 0183 log: ground_speed, course, latitude, longitude, altitude, hdop, quality and satellites.
 
     Sentences with a wrong checksum are left out and counted; without a fix values are missing. Raises InputError if no
@@ -96,9 +95,9 @@ def read_nmea(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     signals = {
         name: Signal(np.array(stamps), np.array(values), UNITS[name])
         for name, (stamps, values) in track.columns.items()
-        if wanted is None or wanted(name)
+        if wanted(name)
     }
-    return SignalLog(tuple(track.columns), signals, path, sha256(path), tuple(notes))
+    return SignalLog(tuple(track.columns), signals, notes=tuple(notes))
 
 
 def _add(sentence: Sentence, track: _Track) -> None:

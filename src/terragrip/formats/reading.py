@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.files import unreadable
+from terragrip.files import sha256, unreadable
 from terragrip.formats.conversion import Part
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.stamps import Stamps
-from terragrip.formats.table import LogTable, Wanted, in_si
+from terragrip.formats.table import EVERY, LogTable, Wanted, in_si
 from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import columns_of, seconds, start_of
@@ -134,9 +134,11 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
     if databases and not own.takes_databases:
         hint = "leave out --dbc, or 'dbc:' in the profile"
         raise InputError(f"is a {own.title}, which needs no DBC", file=path, hint=hint)
+    wanted = EVERY if wanted is None else wanted
     if own.read is not None:
         try:
-            return own.read(os.fspath(path), wanted, databases)
+            log = own.read(os.fspath(path), wanted, databases)
+            return replace(log, source=log.source or os.fspath(path), sha256=log.sha256 or sha256(path))
         except OSError as error:
             raise unreadable(path, error) from error
     table = None if own.in_blocks is None else own.in_blocks(os.fspath(path))

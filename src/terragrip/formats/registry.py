@@ -39,18 +39,18 @@ _HEAD = 8192  # bytes that tell
 _BAG, _NOTES = (".db3", ".mcap"), (".txt", ".log", ".dat")  # of a bag, and what may lie beside it
 
 Databases = Sequence[str | os.PathLike[str]]
-Reader = Callable[[str, Wanted | None, Databases], "LogTable | SignalLog"]
+Reader = Callable[[str, Wanted, Databases], "LogTable | SignalLog"]
 
 
 @dataclass(frozen=True)
 class Format:
     """A format of logs.
 
-    ``name`` registers it, ``title`` is for messages. ``read`` gives of a path the ``wanted`` signals (None: all) as a `SignalLog`,
-    or the columns of a table as a `LogTable`; it raises InputError where the file is damaged, and may raise OSError where it cannot be
-    read. A file is of this format where it begins with one of ``magic``, or ``recognises`` says so of its first 8 KiB; of a file that no
-    format knows, one of ``suffixes`` tells. ``takes_databases``: it holds CAN frames, which DBC files decode. ``in_blocks`` gives a file
-    that is one table as a `TableOnDisk`; without ``read`` it always does, with it None may come back.
+    ``name`` registers it, ``title`` is for messages. ``read`` gives of a path the ``wanted`` signals as a `SignalLog`, or the columns of a
+    table as a `LogTable`; it raises InputError where the file is damaged, and may raise OSError where it cannot be read. The path and the
+    file's SHA-256 are added to what it gives. A file is of this format where it begins with one of ``magic``, or ``recognises`` says so of
+    its first 8 KiB; of a file that no format knows, one of ``suffixes`` tells. ``takes_databases``: it holds CAN frames, which DBC files
+    decode. ``in_blocks`` gives a file that is one table as a `TableOnDisk`; without ``read`` it always does, with it None may come back.
     """
 
     name: str

@@ -17,7 +17,7 @@ from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import Wanted
 
 
-def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_ros1(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Read a ROS 1 bag by topic and field, with or without an index; raises InputError if it is damaged from the start.
 
     A bag that was cut off is read as far as it goes.
@@ -47,7 +47,7 @@ def read_ros1(path: str, wanted: Wanted | None, databases: Databases) -> SignalL
     return log_of(topics.values(), path, [*types.notes(), *notes])
 
 
-def read_ros2(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_ros2(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Read a ROS 2 bag, a folder or one of its files, by topic and field.
 
     Message types that the bag does not describe must be those that come with ROS 2.
@@ -78,9 +78,7 @@ def _files_of(path: str) -> list[Path]:
     raise InputError("has no bag file", file=path, hint=hint)
 
 
-def _collect(
-    file: Path, wanted: Wanted | None, topics: dict[str, Topic], types: Types, notes: list[str]
-) -> None:
+def _collect(file: Path, wanted: Wanted, topics: dict[str, Topic], types: Types, notes: list[str]) -> None:
     """Read the messages of one SQLite file into their topics."""
     with (
         as_far_as_it_goes(file, "ROS 2 bag", notes, sqlite3.Error) as seen,
@@ -108,7 +106,7 @@ def _collect(
 
 
 def _topics_of(
-    base: sqlite3.Connection, wanted: Wanted | None, topics: dict[str, Topic], types: Types
+    base: sqlite3.Connection, wanted: Wanted, topics: dict[str, Topic], types: Types
 ) -> dict[int, tuple[Topic, Decode]]:
     """The topics of a SQLite file by number, with how their messages are read."""
     tables = {row[0] for row in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}

@@ -49,7 +49,7 @@ class Samples:
     unit: str | None = None
 
 
-def signals_of(items: Iterable[Clock | Samples], wanted: Wanted | None) -> dict[str, Signal]:
+def signals_of(items: Iterable[Clock | Samples], wanted: Wanted) -> dict[str, Signal]:
     """Signals by name from clocks and samples, each behind its clock: of a log that is looked at in parts, some of their rows."""
     clocks: dict[Any, Floats] = {}
     result = {}

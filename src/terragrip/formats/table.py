@@ -14,32 +14,37 @@ from terragrip.recording.schema import unit_of
 from terragrip.units import UnitError, factor_to
 
 Wanted = Callable[[str], bool]
+"""Whether a column, or a signal, is wanted."""
 _TICKS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # a second's
 _SAMPLES = 10_000  # of a signal that are kept or left out together, where a log is looked at in parts
 
 
 @dataclass(frozen=True)
 class Sparse:
-    """All columns, but of every ``every`` blocks of records one: for a look at a log that is too long to hold."""
+    """All columns; of every ``every`` blocks of records one, for a look at a log that is too long to hold."""
 
-    every: int
+    every: int = 1
 
     def __call__(self, name: str) -> bool:
         return True
 
 
-def every_of(wanted: Wanted | None) -> int:
+EVERY = Sparse()
+"""All columns, and all of each."""
+
+
+def every_of(wanted: Wanted) -> int:
     """Of how many blocks of records one is read."""
     return wanted.every if isinstance(wanted, Sparse) else 1
 
 
-def skips(number: int, block: int, wanted: Wanted | None) -> bool:
+def skips(number: int, block: int, wanted: Wanted) -> bool:
     """Whether the record of this ``number`` is in a block, of ``block`` records, that is not read."""
     every = every_of(wanted)
-    return every > 1 and (number // block) % every > 0
+    return (number // block) % every > 0
 
 
-def kept_rows(count: int, wanted: Wanted | None) -> npt.NDArray[np.intp] | slice:
+def kept_rows(count: int, wanted: Wanted) -> npt.NDArray[np.intp] | slice:
     """Which of ``count`` samples of a signal are in a block that is read."""
     every = every_of(wanted)
     if every <= 1:

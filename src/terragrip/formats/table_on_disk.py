@@ -56,10 +56,10 @@ class TableOnDisk:
             raise InputError("occurs twice", file=self.source, place=f"column {name}", hint=hint)
         return self.blocks(chosen, every)
 
-    def whole(self, wanted: Wanted | None) -> LogTable:
-        """The wanted columns (None: all) of all blocks; raises InputError as these do."""
+    def whole(self, wanted: Wanted) -> LogTable:
+        """The wanted columns of all blocks; raises InputError as these do."""
         every = every_of(wanted)
-        if wanted is None or isinstance(wanted, Sparse):
+        if isinstance(wanted, Sparse):
             chosen = [name for name in self.names if name not in (*self.unreadable, *self.twice)]
         else:
             chosen = [name for name in self.names if wanted(name)]

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.table import LogTable, Wanted
 
@@ -25,10 +24,10 @@ _UNITS = {  # of the receiver's own columns; the file states those of added chan
 _AS_WRITTEN = {"°/s": "deg/s", "°": "deg", "kph": "km/h", "volts": "V"}
 
 
-def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> LogTable:
+def read_vbo(path: str, wanted: Wanted, databases: Databases = ()) -> LogTable:
     """Read a VBO file: ``time`` [s of the day], ``lat`` and ``long`` [deg, east positive], the rest as the file states it.
 
-    ``wanted`` says which columns to read (None: all). Raises InputError where the sections are missing or a row does not fit.
+    Only columns that are ``wanted`` are kept. Raises InputError where the sections are missing or a row does not fit.
     """
     text = Path(path).read_bytes().decode("latin-1")
     sections = _sections(text)
@@ -48,10 +47,10 @@ def read_vbo(path: str, wanted: Wanted | None, databases: Databases = ()) -> Log
             )
     columns: dict[str, npt.NDArray[Any]] = {}
     for k, name in enumerate(names):
-        if wanted is None or wanted(name):
+        if wanted(name):
             columns[name] = _column(name, [row[k] for row in rows], path)
     units = _units(names, sections.get("channel units", ""))
-    return LogTable(names, columns, units, path, sha256(path), tuple(notes))
+    return LogTable(names, columns, units, notes=tuple(notes))
 
 
 def _sections(text: str) -> dict[str, str]:

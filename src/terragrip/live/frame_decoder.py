@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from terragrip.formats.can.bits import decode
-from terragrip.formats.can.catalog import EXTENDED, Message, catalog, group_of, source_of
+from terragrip.formats.can.catalog import EXTENDED, Message, catalog, source_of
 from terragrip.formats.can.frames import of_sender
-from terragrip.formats.can.transport import CONNECTION, DATA, Transport, is_fast
+from terragrip.formats.can.transport import Transport, is_part
 from terragrip.live.payload import Fields
 
 
@@ -39,15 +39,10 @@ class FrameDecoder:
         "Not available" and "error" are left out.
         """
         key = identifier | EXTENDED if extended else identifier
-        if extended and (group := group_of(key)) in (CONNECTION, DATA):
-            whole = self._transport.add(group, source_of(key), (identifier >> 8) & 0xFF, data)
-            # By the identifier that it would have in one frame.
-            return {} if whole is None else self._fields(EXTENDED | whole[0] << 8 | source_of(key), whole[1])
-        message = self._catalog.message_of(key) if extended else None
-        if message is not None and message.by_group and is_fast(message.key, message.length):
-            whole = self._transport.add_fast(message.key, source_of(key), data)
-            return {} if whole is None else self._fields(key, whole[1])
-        return self._fields(key, data)
+        if not is_part(key, self._catalog.message_of(key)):
+            return self._fields(key, data)
+        whole = self._transport.add(key, data)
+        return {} if whole is None else self._fields(*whole)
 
     def _fields(self, key: int, data: bytes) -> Fields:
         """The wanted fields of a whole payload."""

@@ -46,10 +46,10 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
         message = frames.seen[name, sender]
         shared = frames.senders(message) > 1
         for plain, signal in _decoded(frames, message, sender, kept).items():
-            if shared and (frames.wanted is None or frames.wanted(of_sender(plain, sender))):
+            if shared and frames.wanted(of_sender(plain, sender)):
                 result[of_sender(plain, sender)] = signal
             rank = int(np.isfinite(signal.values).sum()), -sender
-            if (frames.wanted is None or frames.wanted(plain)) and rank > best.get(plain, (-1, 0)):
+            if frames.wanted(plain) and rank > best.get(plain, (-1, 0)):
                 best[plain], result[plain] = rank, signal
                 several |= {plain} if shared else set()
     return result, [*_on_senders(best, several), *_on_missing(result), *_on_frames(frames)]
@@ -60,9 +60,7 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
     wanted = {
         field
         for field, name in names.items()
-        if frames.wanted is None
-        or frames.wanted(name)
-        or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
+        if frames.wanted(name) or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
     }
     time, lengths = (np.concatenate([block[k] for block in kept]) for k in (0, 1))
     data = np.zeros((len(time), int(lengths.max())), np.uint8)

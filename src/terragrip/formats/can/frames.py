@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.formats.can.catalog import EXTENDED, Catalog, Message, group_of, source_of
-from terragrip.formats.can.transport import CONNECTION, DATA, Transport, is_fast
-from terragrip.formats.table import Wanted, every_of, skips
+from terragrip.formats.can.catalog import Catalog, Message, source_of
+from terragrip.formats.can.transport import Transport, is_part
+from terragrip.formats.table import EVERY, Wanted, every_of, skips
 
 _BLOCK = 20_000  # frames that are sorted, read or left out together
 NO_SENDER = -1
@@ -22,8 +21,8 @@ Frame = tuple[float, int, bytes]
 Bytes = npt.NDArray[np.uint8]
 Block = tuple[Floats, npt.NDArray[np.uint16], Bytes]
 """Stamps (n,) [s], lengths (n,) and payloads (n, bytes) of frames."""
-Part = Callable[[bytes], tuple[int, bytes] | None]
-"""Takes a part of a longer message; gives group and payload of one that is whole."""
+Route = list[Block] | Transport | None
+"""Where frames are kept, or what puts them together as parts of longer messages; None where no signal of them is wanted."""
 
 
 def of_sender(name: str, sender: int) -> str:
@@ -40,14 +39,14 @@ class Frames:
     """
 
     catalog: Catalog
-    wanted: Wanted | None = None
+    wanted: Wanted = EVERY
     count: int = 0
     first: float | None = None
     kept: dict[tuple[str, int], list[Block]] = field(default_factory=dict)
     seen: dict[tuple[str, int], Message] = field(default_factory=dict)
     unknown: dict[int, int] = field(default_factory=dict)
     transport: Transport = field(default_factory=Transport)
-    _routes: dict[tuple[int, bool], list[Block] | Part | None] = field(default_factory=dict)
+    _routes: dict[tuple[int, bool], Route] = field(default_factory=dict)
     _waiting: list[Frame] = field(default_factory=list)
     _number: int = 0  # frames so far, with those left out
 
@@ -93,11 +92,9 @@ class Frames:
                 self.unknown[identifier] += int(rows.sum())
         put_together: list[Frame] = []
         for k in np.flatnonzero(parts).tolist():
-            part = self._route_of(identifier := int(identifiers[k]))
-            message = part(data[k, : lengths[k]].tobytes()) if callable(part) else None
-            if message is not None and message[0] in self.catalog.by_group:
-                own = EXTENDED | message[0] << 8 | source_of(identifier)
-                put_together.append((float(time[k]), own, message[1]))
+            message = self.transport.add(int(identifiers[k]), data[k, : lengths[k]].tobytes())
+            if message is not None and self.catalog.message_of(message[0]) is not None:
+                put_together.append((float(time[k]), *message))
         if put_together:
             self._sort(*_block(put_together), whole=True)
 
@@ -123,28 +120,24 @@ class Frames:
         """How many have sent a message."""
         return sum(name == message.name for name, _ in self.seen)
 
-    def _route_of(self, identifier: int, *, whole: bool = False) -> list[Block] | Part | None:
-        """Where the frames of an identifier are kept, or what takes them as parts; None if no signal of them is wanted."""
+    def _route_of(self, identifier: int, *, whole: bool = False) -> Route:
         key = identifier, whole
         if key not in self._routes:
             self._routes[key] = self._route(identifier, whole=whole)
         return self._routes[key]
 
-    def _route(self, identifier: int, *, whole: bool) -> list[Block] | Part | None:
-        source, group = source_of(identifier), group_of(identifier)
-        if identifier & EXTENDED and group in (CONNECTION, DATA):
-            return lambda data: self.transport.add(group, source, (identifier >> 8) & 0xFF, data)
+    def _route(self, identifier: int, *, whole: bool) -> Route:
         message = self.catalog.message_of(identifier)
+        if not whole and is_part(identifier, message):
+            return self.transport
         if message is None:
             self.unknown[identifier] = 0
             return None
-        if not whole and message.by_group and is_fast(message.key, message.length):
-            return lambda data: self.transport.add_fast(message.key, source, data)
-        sender = source if message.by_group else NO_SENDER
+        sender = source_of(identifier) if message.by_group else NO_SENDER
         self.seen[message.name, sender] = message
         names = [self.catalog.name(message, f) for f in message.fields]
         own = names if sender == NO_SENDER else [of_sender(name, sender) for name in names]
-        if self.wanted is not None and not any(map(self.wanted, (*names, *own))):
+        if not any(map(self.wanted, (*names, *own))):
             return None
         return self.kept.setdefault((message.name, sender), [])
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from terragrip.errors import InputError
-from terragrip.files import sha256
 from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
@@ -41,7 +40,7 @@ _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of i
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
 
 
-def read_blf(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_blf(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Vector BLF, by python-can; one that is damaged behind some frames is read as far as it goes."""
     can = needed("can", "a BLF log")
     frames, notes = Frames(catalog(databases), wanted), list[str]()
@@ -74,22 +73,22 @@ def blf_reader(of: Any) -> Any:
     return Reader
 
 
-def read_asc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_asc(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Vector ASC, by python-can; time counts from the start of the measurement."""
     return _text_by_python_can(path, "ASCReader", "ASC log", wanted, databases)
 
 
-def read_trc(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_trc(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """PEAK TRC, by python-can."""
     return _text_by_python_can(path, "TRCReader", "TRC log", wanted, databases)
 
 
-def read_candump(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_candump(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """candump's log files and printed lines."""
     return _from_lines(path, "candump log", wanted, databases, candump)
 
 
-def read_frame_table(path: str, wanted: Wanted | None, databases: Databases) -> SignalLog:
+def read_frame_table(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """Tables with time, identifier (or pgn and source) and data columns."""
 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
@@ -135,12 +134,10 @@ def finished(
     if scale != 1.0:
         scaled = {id(s.time): s.time * scale for s in signals.values()}
         signals = {n: type(s)(scaled[id(s.time)], s.values, s.unit) for n, s in signals.items()}
-    return SignalLog(names_of(frames), signals, path, sha256(path), (*notes, *remarks))
+    return SignalLog(names_of(frames), signals, notes=(*notes, *remarks))
 
 
-def _text_by_python_can(
-    path: str, reader: str, kind: str, wanted: Wanted | None, databases: Databases
-) -> SignalLog:
+def _text_by_python_can(path: str, reader: str, kind: str, wanted: Wanted, databases: Databases) -> SignalLog:
     can = needed("can", f"a {kind}")
 
     def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
@@ -154,7 +151,7 @@ def _text_by_python_can(
 def _from_lines(
     path: str,
     kind: str,
-    wanted: Wanted | None,
+    wanted: Wanted,
     databases: Databases,
     parse: Callable[[Iterator[str], Count, Frames], Iterator[Frame]],
 ) -> SignalLog:
