@@ -70,6 +70,7 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
         data[row : row + len(part), : part.shape[1]] = part
         row += len(part)
     values = decode(message.fields, wanted, data, lengths)
+    time = time if frames.tick == 1.0 else time * frames.tick
     units = {f.name: f.unit for f in message.fields}
     return {names[field]: Signal(time, column, units[field]) for field, column in values.items()}
 

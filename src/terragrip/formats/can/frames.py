@@ -35,13 +35,14 @@ class Frames:
     """Takes the frames of a log and keeps those of wanted signals.
 
     ``kept`` (blocks of payloads) and ``seen``: by message name and sender. ``unknown``: frames by identifier that the catalog lacks.
-    All speak of the frames up to the last `flush`.
+    All speak of the frames up to the last `flush`. ``tick``: seconds that the stamps count.
     """
 
     catalog: Catalog
     wanted: Wanted = EVERY
     count: int = 0
     first: float | None = None
+    tick: float = 1.0
     kept: dict[tuple[str, int], list[Block]] = field(default_factory=dict)
     seen: dict[tuple[str, int], Message] = field(default_factory=dict)
     unknown: dict[int, int] = field(default_factory=dict)

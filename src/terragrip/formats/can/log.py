@@ -6,27 +6,26 @@ import io
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from terragrip.errors import InputError
-from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes, needed
+from terragrip.formats.boundary import as_far_as_it_goes, needed
 from terragrip.formats.can.catalog import catalog
 from terragrip.formats.can.decoding import identifier_text, names_of, signals_of
 from terragrip.formats.can.frames import Frame, Frames
 from terragrip.formats.can.text_logs import (
     Count,
-    Numbered,
-    asc_lines,
-    by_python_can,
+    asc,
     candump,
     frames_of,
     is_asc,
     is_candump,
     is_frame_table,
     is_trc,
-    layout_of,
     table,
+    trc,
 )
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import SignalLog
@@ -38,6 +37,8 @@ _TOO_SHORT = re.compile(
 _LONGEST = 4096  # characters of a line
 _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
+
+Parse = Callable[[Iterator[str], Count, Frames], Iterator[Frame]]
 
 
 def read_blf(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
@@ -73,45 +74,17 @@ def blf_reader(of: Any) -> Any:
     return Reader
 
 
-def read_asc(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
-    """Vector ASC, by python-can; time counts from the start of the measurement."""
-    return _text_by_python_can(path, "ASCReader", "ASC log", wanted, databases)
-
-
-def read_trc(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
-    """PEAK TRC, by python-can."""
-    return _text_by_python_can(path, "TRCReader", "TRC log", wanted, databases)
-
-
-def read_candump(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
-    """candump's log files and printed lines."""
-    return _from_lines(path, "candump log", wanted, databases, candump)
-
-
-def read_frame_table(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
-    """Tables with time, identifier (or pgn and source) and data columns."""
-
-    def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
-        layout = layout_of(next(lines, ""))
-        if layout is None:
-            raise InputError("is not a table of CAN frames", file=path, hint="give time, id and data columns")
-        return table(lines, layout, count, frames)
-
-    return _from_lines(path, "table of CAN frames", wanted, databases, parse)
-
-
 def finished(
     frames: Frames,
     path: str,
     notes: Sequence[str],
     databases: Databases,
-    scale: float = 1.0,
     *,
     refuse_unknown: bool = True,
 ) -> SignalLog:
     """The signals of all frames taken; raises InputError where none is known, and says which there are.
 
-    ``scale`` takes the stamps to seconds; ``refuse_unknown`` False lets a log pass that has other signals.
+    ``refuse_unknown`` False lets a log pass that has other signals.
     """
     frames.flush()
     if not frames.count:
@@ -131,30 +104,17 @@ def finished(
             hint="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
         )
     signals, remarks = signals_of(frames)
-    if scale != 1.0:
-        scaled = {id(s.time): s.time * scale for s in signals.values()}
-        signals = {n: type(s)(scaled[id(s.time)], s.values, s.unit) for n, s in signals.items()}
     return SignalLog(names_of(frames), signals, notes=(*notes, *remarks))
 
 
-def _text_by_python_can(path: str, reader: str, kind: str, wanted: Wanted, databases: Databases) -> SignalLog:
-    can = needed("can", f"a {kind}")
-
-    def parse(lines: Iterator[str], count: Count, frames: Frames) -> Iterator[Frame]:
-        numbered: Iterator[Numbered] = enumerate(lines, 1)
-        own = asc_lines(numbered, frames, count) if reader == "ASCReader" else numbered
-        return by_python_can(getattr(can, reader)(io.StringIO()), own, count, (*DAMAGE, can.CanError))
-
-    return _from_lines(path, kind, wanted, databases, parse)
-
-
 def _from_lines(
-    path: str,
     kind: str,
+    parse: Parse,
+    path: str,
     wanted: Wanted,
     databases: Databases,
-    parse: Callable[[Iterator[str], Count, Frames], Iterator[Frame]],
 ) -> SignalLog:
+    """A text log of a ``kind``, of whose lines ``parse`` makes frames."""
     frames, count = Frames(catalog(databases), wanted), Count()
     last = 0.0
     with Path(path).open("rb") as stream:
@@ -163,37 +123,34 @@ def _from_lines(
             frames.add(time, identifier, payload)
             last = time
     frames.flush()
-    if count.bad > _MOST_BAD * (count.bad + frames.count):
-        problem, hint = (
-            f"is a damaged {kind}, or none: {count.bad} lines have no frame",
-            "copy or record it again",
+    notes = _on_lines(count, frames.count, kind, path)
+    span = last - (frames.first or 0.0)
+    if parse is table and span > 0 and 100 < frames.count < _BUSY * span and last < 1e8:
+        frames.tick = 1e-3
+        notes.append(
+            "The frames' stamps were read as milliseconds: in seconds the bus would be nearly silent."
         )
+    return finished(frames, path, notes, databases)
+
+
+def _on_lines(count: Count, good: int, kind: str, path: str) -> list[str]:
+    """Sentences on the lines of a log with so many ``good`` ones; raises InputError where most hold no frame."""
+    place = f"line {count.first} ({count.shown!r})"
+    if count.bad > _MOST_BAD * (count.bad + good):
+        problem = f"is a damaged {kind}, or none: {count.bad} lines have no frame"
+        hint = "copy or record it again"
         if count.unstamped:
             problem, hint = "its frames have no stamps", "record it by candump -l, or with -t a"
-        place = f"line {count.first} ({count.shown!r})"
         raise InputError(problem, file=path, place=place, hint=hint)
     notes = []
     if count.bad:
         what = "1 line has no frame:" if count.bad == 1 else f"{count.bad} lines have no frame, the first is"
-        notes.append(f"{what} line {count.first} ({count.shown!r}); left out.")
+        notes.append(f"{what} {place}; left out.")
     if count.begun:
         notes.append(
             "The log has no 'End TriggerBlock': it was cut, or its logger was, and the drive may have gone on."
         )
-    scale = 1.0
-    span = last - (frames.first or 0.0)
-    if (
-        span > 0
-        and frames.count > 100
-        and frames.count / span < _BUSY
-        and last < 1e8
-        and kind.startswith("table")
-    ):
-        scale = 1e-3
-        notes.append(
-            "The frames' stamps were read as milliseconds: in seconds the bus would be nearly silent."
-        )
-    return finished(frames, path, notes, databases, scale)
+    return notes
 
 
 def _bounded(lines: io.TextIOBase) -> Iterator[str]:
@@ -202,12 +159,17 @@ def _bounded(lines: io.TextIOBase) -> Iterator[str]:
         yield line
 
 
+def _text(name: str, title: str, suffix: str, recognises: Callable[[bytes], bool], parse: Parse) -> Format:
+    reader = partial(_from_lines, title, parse)
+    return Format(
+        name, title, reader, (suffix,) if suffix else (), recognises=recognises, takes_databases=True
+    )
+
+
 FORMATS = (
     Format("blf", "BLF log", read_blf, (".blf",), (b"LOGG",), takes_databases=True),
-    Format("asc", "ASC log", read_asc, (".asc",), recognises=is_asc, takes_databases=True),
-    Format("trc", "TRC log", read_trc, (".trc",), recognises=is_trc, takes_databases=True),
-    Format("candump", "candump log", read_candump, (".log",), recognises=is_candump, takes_databases=True),
-    Format(
-        "frames", "table of CAN frames", read_frame_table, recognises=is_frame_table, takes_databases=True
-    ),
+    _text("asc", "ASC log", ".asc", is_asc, asc),
+    _text("trc", "TRC log", ".trc", is_trc, trc),
+    _text("candump", "candump log", ".log", is_candump, candump),
+    _text("frames", "table of CAN frames", "", is_frame_table, table),
 )

@@ -1,16 +1,18 @@
-"""CAN frames in text: candump's two forms, and tables with an identifier and a data column."""
+"""CAN frames in text: candump's forms, ASC and TRC by python-can, and tables with an identifier and a data column."""
 
 from __future__ import annotations
 
 import base64
 import binascii
+import io
 import itertools
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from terragrip.formats.boundary import DAMAGE, needed
 from terragrip.formats.can.catalog import EXTENDED
 from terragrip.formats.can.frames import Frame, Frames
 
@@ -36,11 +38,8 @@ _TRC_REMARK = re.compile(
 )
 _STAMP = re.compile(r"\d+\.\d+")
 _NO_DATA = re.compile(r"#R\d?\b|remote request|ERRORFRAME|\b2[0-9A-Fa-f]{7}[# ]")
-_HEAD, _BACK, _LONGEST_STEP = (
-    200,
-    0.2,
-    1e6,
-)  # frames that tell what stamps count from: steps run back often, and are short
+_HEAD = 200  # lines that tell what stamps count from:
+_BACK, _LONGEST_STEP = 0.2, 1e6  # steps run back often, and are short
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
 _BITS = 29  # of an identifier at most
 
@@ -55,12 +54,10 @@ _TIMES = {
 }
 _IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
 _DATA = ("data", "databytes", "payload", "data_hex")
-
+_SOURCES, _EXTENDED = ("source", "src", "sa"), ("extended", "ide")
+_YES, _NO = ("1", "true"), ("", "0", "false")
 
 # What the first lines of each form look like.
-_CANDUMP = re.compile(
-    r"\s*(?:\((?:\d{4}-\d\d-\d\d )?[\d:]+\.\d+\)\s+)?\S+\s+(?:[RT]X\s+\S+\s+\S+\s+)?[0-9A-Fa-f]{3,8}(?:#[0-9A-Fa-fR#]|\s+\[\s*\d+\])"
-)
 _TRC = re.compile(r"\s*\d+\)\s+\d+(?:\.\d+)?\s+(?:\d+\s+)?(?:[RT]x\s+)?[0-9A-Fa-f]{4,8}\s", re.IGNORECASE)
 _ASC = re.compile(rb"\A(?:\s*//[^\n]*\n)*\s*(?:date\s|base\s+(?:hex|dec))", re.IGNORECASE)
 _LIKE = 1 / 3  # share of the first lines that must have a form
@@ -78,19 +75,19 @@ def is_trc(head: bytes) -> bool:
 
 def is_candump(head: bytes) -> bool:
     """Whether a file that begins so is a log of candump, or its printed lines."""
-    return lines_are_like(head, _CANDUMP)
+    return lines_are_like(head, _COMPACT, _SPACED, _UNSTAMPED)
 
 
 def is_frame_table(head: bytes) -> bool:
     """Whether a file that begins so is a table with columns of stamps, identifiers and payloads."""
     header = next((line for line in head.splitlines() if line.strip()), b"").decode("utf-8", "replace")
-    return layout_of(header) is not None
+    return _is_frame_header(_cells(header)[1])
 
 
-def lines_are_like(head: bytes, form: re.Pattern[str]) -> bool:
-    """Whether more than a third of the first lines have a form."""
+def lines_are_like(head: bytes, *forms: re.Pattern[str]) -> bool:
+    """Whether more than a third of the first lines have one of the forms."""
     lines = [line.decode("latin-1") for line in head.splitlines()[:40] if line.strip()]
-    return sum(form.match(line) is not None for line in lines) > _LIKE * len(lines)
+    return sum(any(form.match(line) for form in forms) for line in lines) > _LIKE * len(lines)
 
 
 @dataclass
@@ -117,32 +114,30 @@ def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Fram
     Stamps are seconds, dates (``-t A``, taken for UTC) or the time since the frame before (``-t d``). Lines of frames that ``frames``
     has no use for are counted there and not looked at any further.
     """
-    passing: list[Frames] = []
-    result = _candump(lines, count, frames, passing)
-    head = list(itertools.islice(result, _HEAD))
-    stamps = [stamp for stamp, _, _ in head]
+    lines = iter(lines)
+    head = list(itertools.islice(lines, _HEAD))
+    stamps = [stamp for stamp, _, _ in _candump(enumerate(head), Count(), None)]
     back = sum(after < before for before, after in itertools.pairwise(stamps))
-    if len(head) < 3 or back < _BACK * len(head) or max(stamps) > _LONGEST_STEP:
-        passing.append(frames)
-        yield from head
-        yield from result
+    numbered = enumerate(itertools.chain(head, lines), 1)
+    if len(stamps) < 3 or back < _BACK * len(stamps) or max(stamps) > _LONGEST_STEP:
+        yield from _candump(numbered, count, frames)
         return
     now = 0.0
-    for step, identifier, payload in itertools.chain(head, result):  # every one, since steps add up
+    for step, identifier, payload in _candump(numbered, count, None):  # every one, since steps add up
         now += step
         yield now, identifier, payload
 
 
-def _candump(lines: Iterable[str], count: Count, frames: Frames, passing: list[Frames]) -> Iterator[Frame]:
-    """Frames with their stamps as they are; once ``passing`` holds ``frames``, lines of no use are passed by."""
+def _candump(lines: Iterable[Numbered], count: Count, frames: Frames | None) -> Iterator[Frame]:
+    """Frames with their stamps as they are; lines that ``frames`` has no use for are passed by."""
     unwanted: dict[str, int] = {}  # identifiers by what stands before the payload
-    for number, line in enumerate(lines, 1):
+    for number, line in lines:
         mark = line.find("#")
         head = line[max(mark - 8, 0) : mark]
-        if passing and head in unwanted:
+        if frames is not None and head in unwanted:
             frames.pass_by(unwanted[head])
             continue
-        if passing and frames.leaves_out_next():
+        if frames is not None and frames.leaves_out_next():
             continue
         match = _COMPACT.match(line) or _SPACED.match(line)
         data = "" if match is None else "".join(match[3].split())
@@ -153,7 +148,7 @@ def _candump(lines: Iterable[str], count: Count, frames: Frames, passing: list[F
             continue
         identifier = int(match[2], 16) | (EXTENDED if len(match[2]) == _EIGHT else 0)
         # Only log files, whose lines have no blanks in the payload, are of the size that makes this worth while.
-        if mark > 0 and frames.are_unwanted(identifier):
+        if frames is not None and mark > 0 and frames.are_unwanted(identifier):
             unwanted[head] = identifier
         yield _seconds(match[1]), identifier, bytes.fromhex(data)
 
@@ -175,15 +170,22 @@ def frames_of(messages: Iterable[Any]) -> Iterator[Frame]:
             yield message.timestamp, message.arbitration_id | wide, bytes(message.data)
 
 
-def by_python_can(
-    reader: Any, lines: Iterable[Numbered], count: Count, errors: tuple[type[Exception], ...]
-) -> Iterator[Frame]:
-    """Frames of an ASC or TRC log by a ``reader`` of python-can, which goes on behind lines that it cannot read; those are counted.
+def asc(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
+    """Frames of a Vector ASC log, by python-can; time counts from the start of the measurement."""
+    return _by_python_can("ASCReader", _asc_lines(enumerate(lines, 1), frames, count), count, _ASC_REMARK)
 
-    ``errors``: what the reader raises. Its ``file`` is whatever gives lines.
-    """
-    is_asc = type(reader).__name__ == "ASCReader"
-    remark = _ASC_REMARK if is_asc else _TRC_REMARK
+
+def trc(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
+    """Frames of a PEAK TRC log, by python-can."""
+    return _by_python_can("TRCReader", enumerate(lines, 1), count, _TRC_REMARK)
+
+
+def _by_python_can(
+    name: str, lines: Iterable[Numbered], count: Count, remark: re.Pattern[str]
+) -> Iterator[Frame]:
+    """Frames by a reader of python-can, which goes on behind lines that it cannot read; those are counted, but for a ``remark``."""
+    can = needed("can", f"a log by {name}")
+    reader = getattr(can, name)(io.StringIO())
     number, shown, in_doubt = 0, "", False
 
     def fed() -> Iterator[str]:
@@ -205,19 +207,19 @@ def by_python_can(
                 else:
                     yield from frames_of((message,))
             break
-        except errors:
+        except (*DAMAGE, can.CanError):
             if number == failed_at:  # it did not get any further
                 break
             failed_at = number
             count.add(number, shown)
             in_doubt = False
             # A reader that begins anew looks for its header, and for ASC drops the line that ends it.
-            reader.file = (line for part in (["\n"] if is_asc else [], source) for line in part)
+            reader.file = (line for part in (["\n"] if name == "ASCReader" else [], source) for line in part)
     if in_doubt:
         count.add(number, shown)
 
 
-def asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Iterator[Numbered]:
+def _asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Iterator[Numbered]:
     """The lines of an ASC log, for python-can to read, but those of frames that ``frames`` has no use for and counts.
 
     Stamps that count from the event before ("timestamps relative") are made to count from the start. ``count`` learns whether the log has
@@ -255,91 +257,49 @@ def _asc_identifier(text: str, base: int) -> int | None:
         return None
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The columns of a table of frames; ``group`` and ``source`` where it gives these in place of an identifier."""
-
-    separator: str
-    width: int
-    time: int
-    scale: float
-    data: int
-    identifier: int | None = None
-    extended: int | None = None
-    skip: tuple[int, ...] = ()
-    group: int | None = None
-    source: int | None = None
-
-
-def layout_of(header: str) -> Layout | None:
-    """The layout that a header line tells, or None if it is no table of CAN frames."""
-    separator = max(";\t,", key=header.count)
-    names = [cell.strip().strip('"').lower() for cell in header.strip().lstrip("\ufeff").split(separator)]
-    time = next((k for k, name in enumerate(names) if name in _TIMES), None)
-    data = next((k for k, name in enumerate(names) if name in _DATA), None)
-    if time is None or data is None:
-        return None
-    own = next((names.index(name) for name in _IDENTIFIERS if name in names), None)
-    group = names.index("pgn") if "pgn" in names else None
-    if own is None and group is None:
-        return None
-    source = next((names.index(name) for name in ("source", "src", "sa") if name in names), None)
-    extended = next((names.index(name) for name in ("extended", "ide") if name in names), None)
-    return Layout(
-        separator,
-        len(names),
-        time,
-        _TIMES[names[time]],
-        data,
-        own,
-        extended,
-        tuple(names.index(name) for name in ("remote", "error") if name in names),
-        None if own is not None else group,
-        source,
-    )
-
-
-def table(lines: Iterable[str], layout: Layout, count: Count, frames: Frames) -> Iterator[Frame]:
-    """Frames of a table of which the header was taken; a line that holds none is counted."""
-    read = _identifier(layout)
-    for number, line in enumerate(lines, 2):
+def table(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
+    """Frames of a table with time, identifier (or pgn and source) and data columns; a line that holds none is counted."""
+    numbered = ((number, line) for number, line in enumerate(lines, 1) if line.strip())
+    separator, names = _cells(next(numbered, (0, ""))[1])
+    for number, line in numbered if _is_frame_header(names) else ():
         if frames.leaves_out_next():
             continue
-        cells = line.rstrip("\r\n").split(layout.separator)
-        if len(cells) != layout.width:
-            if line.strip():
-                count.add(number, line)
-            continue
+        cells = line.rstrip("\r\n").split(separator)
+        row = dict(zip(names, cells, strict=False))
         try:
-            if any(cells[k].strip() not in ("", "0", "False", "false") for k in layout.skip):
+            if len(cells) != len(names):
+                raise ValueError("a row of another width")
+            if any(row.get(mark, "").strip().lower() not in _NO for mark in ("remote", "error")):
                 continue
-            yield (
-                layout.scale * float(cells[layout.time].replace(",", ".")),
-                read(cells),
-                _payload(cells[layout.data]),
-            )
+            (time, scale), *_ = ((row[name], _TIMES[name]) for name in names if name in _TIMES)
+            payload = _payload(next(row[name] for name in names if name in _DATA))
+            yield scale * float(time.replace(",", ".")), _identifier(row), payload
         except (ValueError, binascii.Error):
             count.add(number, line)
 
 
-def _identifier(layout: Layout) -> Callable[[list[str]], int]:
-    if layout.identifier is None:
-        group, source = layout.group, layout.source
-        assert group is not None
-        return lambda cells: (
-            EXTENDED | _checked(int(cells[group]) << 8) | (int(cells[source]) & 0xFF if source else 0xFE)
-        )
-    place, extended = layout.identifier, layout.extended
+def _cells(header: str) -> tuple[str, list[str]]:
+    """The separator of a table, and the names in its header."""
+    separator = max(";\t,", key=header.count)
+    return separator, [c.strip().strip('"').lower() for c in header.strip().lstrip("\ufeff").split(separator)]
 
-    def read(cells: list[str]) -> int:
-        text = cells[place].strip().strip('"').lower().removeprefix("0x").rstrip("hx")
-        number = _checked(int(text, 16))
-        wide = number > 0x7FF or (
-            len(text) == _EIGHT if extended is None else cells[extended].strip() in ("1", "True", "true")
-        )
-        return number | EXTENDED if wide else number
 
-    return read
+def _is_frame_header(names: list[str]) -> bool:
+    return all(any(name in known for name in names) for known in (_TIMES, _DATA, (*_IDENTIFIERS, "pgn")))
+
+
+def _identifier(row: dict[str, str]) -> int:
+    """The identifier of a row: as it stands there, or made of group and source; raises ValueError where it is none."""
+    written, source, extended = (
+        next((row[name].strip().strip('"').lower() for name in names if name in row), None)
+        for names in (_IDENTIFIERS, _SOURCES, _EXTENDED)
+    )
+    if written is None:
+        return EXTENDED | _checked(int(row["pgn"]) << 8) | (0xFE if source is None else int(source) & 0xFF)
+    text = written.removeprefix("0x").rstrip("hx")
+    number = _checked(int(text, 16))
+    wide = number > 0x7FF or (len(text) == _EIGHT if extended is None else extended in _YES)
+    return number | EXTENDED if wide else number
 
 
 def _checked(identifier: int) -> int:
