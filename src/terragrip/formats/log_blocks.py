@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.formats.conversion import asked, converted_block, first_start, settled
 from terragrip.formats.profile import Profile
+from terragrip.formats.reading import loaded, read
 from terragrip.formats.registry import format_of
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable, in_si
@@ -37,11 +37,9 @@ def log_in_blocks(
     A long table is read a block at a time where each of its rows can be determined by itself; any other log is read whole and cut. Raises
     InputError as `read` does, of a long table each where its block is reached.
     """
-    from terragrip.formats.reading import read
-
     if isinstance(profile, list | tuple):
         return LogBlocks.of(read(path, profile, dbc=dbc), ROWS)
-    chosen = profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)  # type: ignore[arg-type]
+    chosen = loaded(profile)  # type: ignore[arg-type]
     log = long_log(path) if isinstance(path, str | os.PathLike) and not dbc else None
     if log is None or recordings_of(log, chosen) is None:
         return LogBlocks.of(read(path, chosen, dbc=dbc), ROWS)
@@ -58,57 +56,43 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
     Raises InputError as `read` does, each where its block is reached; that a channel is empty over the whole file shows at the end
     only.
     """
-    table = LogTable(log.names, {}, log.units, log.source, clocked=log.clocked)
-    about = _About()
+    table = LogTable(log.names, {}, log.units, log.source, log.digest, clocked=log.clocked)
     if profile is None:
         chosen = [name for name in log.names if is_own(name)]
-        own = (
-            in_si(block)
-            for block in _with_time_base(log, log.read(chosen), table, TIME, log.units.get(TIME, "s"))
-        )
-        return aligned(_checked(own, log.names, chosen, log.source, log.digest, about, log.notes))
+        based = _with_time_base(log, log.read(chosen), table, Stamps(TIME, log.units.get(TIME, "s")))
+        own = (replace(block, columns=in_si(block)) for block in based)
+        return aligned(_checked(log, own, log.names, chosen))
     result = settled(profile, table)
     if result is None:
         return None
     ready, notes = result
     log.notes.extend(notes)
     names = [TIME, *ready.channels]
-    about.profiles = (profile.to_dict(),)
-    blocks = _converted(log, ready, table, about)
-    return aligned(_checked(blocks, tuple(names), names, log.source, log.digest, about, log.notes))
+    blocks = _checked(log, _converted(log, ready, table), tuple(names), names)
+    return aligned(replace(block, profiles=(profile.to_dict(),)) for block in blocks)
 
 
-@dataclass
-class _About:
-    """What a log's recordings say of all of it: when time 0 was, known once the first block came, and the profile."""
-
-    start: float | None = None
-    profiles: tuple[Mapping[str, Any], ...] = ()
-
-
-def _converted(log: TableOnDisk, profile: Profile, table: LogTable, about: _About) -> Iterator[Columns]:
-    """The blocks of a log as a `settled` profile makes channels of them."""
+def _converted(log: TableOnDisk, profile: Profile, table: LogTable) -> Iterator[LogTable]:
+    """The blocks of a log as a `settled` profile makes channels of them; the first says when time 0 was."""
+    column = profile.time.column
     wanted = asked(profile, log.names)
+    blocks = _one_row_an_instant(log, log.read([name for name in log.names if name in wanted]), column)
     first = None
-    blocks = _one_row_an_instant(
-        log, log.read([name for name in log.names if name in wanted]), profile.time.column
-    )
-    for block in _with_time_base(log, blocks, table, profile.time.column, profile.time.unit):
-        stamps = block.columns[profile.time.column]
+    for block in _with_time_base(log, blocks, table, Stamps(column, profile.time.unit)):
+        stamps = block.columns[column]
         if not len(stamps):
             continue
+        start = None
         if first is None:
-            first = stamps[0]
+            first, start = stamps[0], first_start(profile.time, stamps)
             log.notes.extend(seconds(stamps[:1], log.source)[1])
-            about.start = first_start(profile.time, stamps)
-        yield converted_block(profile, block, first)
+        yield replace(block, columns=converted_block(profile, block, first), start=start)
 
 
 def _with_time_base(
-    log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, column: str, unit: str
+    log: TableOnDisk, blocks: Iterator[Columns], table: LogTable, stamps: Stamps
 ) -> Iterator[LogTable]:
     """The blocks as tables whose stamps are a time base."""
-    stamps = Stamps(column, unit)
     for block in blocks:
         part = stamps.corrected(replace(table, columns=block))
         log.notes.extend(note for note in part.notes if note not in log.notes)
@@ -150,48 +134,44 @@ def long_log(path: str | os.PathLike[str]) -> TableOnDisk | None:
 
 
 def _checked(
-    blocks: Iterable[Columns],
-    names: tuple[str, ...],
-    chosen: list[str],
-    source: str,
-    digest: str,
-    about: _About,
-    more_notes: Sequence[str] = (),
+    log: TableOnDisk, blocks: Iterable[LogTable], names: tuple[str, ...], chosen: list[str]
 ) -> Iterator[Recording]:
-    """Consecutive blocks of columns as checked recordings; they together are what `Recording.from_frame` makes of all.
+    """Consecutive blocks of a log as checked recordings; they together are what `Recording.from_frame` makes of all.
 
-    ``names``: all columns of the log, ``chosen``: those in the blocks; ``digest``: SHA-256 of the file; ``about``: what is known of all
-    of it; ``more_notes``: notes, to which the blocks may add as they come. Raises InputError as that does, each when its block is reached;
+    ``names``: all columns of the log, ``chosen``: those in the blocks. Raises InputError as that does, each when its block is reached;
     that a channel is empty over the whole file shows at the end only.
     """
-    checks.require_columns(names, source)
+    checks.require_columns(names, log.source)
     notes = list(checks.remarks(names))
     silent, first, after = set(chosen), 0, None
     origin: np.datetime64 | None = None
-    for columns in blocks:
-        time = columns[TIME]
+    start: float | None = None
+    for table in blocks:
+        columns, time = table.columns, table.columns[TIME]
         if not len(time):
             continue
         if time.dtype.kind == "M":
             if origin is None:
                 origin = time[0]
-                notes += seconds(time[:1], source)[1]
+                notes += seconds(time[:1], log.source)[1]
             columns = {**columns, TIME: time - origin}
         elif origin is not None:
             raise InputError(
-                "holds dates and numbers", file=source, place=f"column {TIME}", hint="give one of them"
+                "holds dates and numbers", file=log.source, place=f"column {TIME}", hint="give one of them"
             )
-        block, _ = Recording.of_block(columns, source, first_row=first, after=after)
+        block, _ = Recording.of_block(columns, log.source, first_row=first, after=after)
         silent -= {
             name for name in silent & block.channels.keys() if not np.isnan(block.channels[name]).all()
         }
-        if first == 0 and about.start is None:
-            about.start = start_of(time, block.time)
-        said = tuple(dict.fromkeys((*notes, *more_notes)))
-        block = replace(block, sha256=digest, notes=said, start=about.start, profiles=about.profiles)
+        if first == 0:
+            start = start_of(time, block.time) if table.start is None else table.start
+        # The log's notes grow as its blocks come.
+        block = replace(
+            block, sha256=log.digest, notes=tuple(dict.fromkeys((*notes, *log.notes))), start=start
+        )
         first, after = first + len(block), float(block.time[-1])
         yield block
     if first == 0:
-        checks.check_time(np.empty(0), source)
+        checks.check_time(np.empty(0), log.source)
     for name in silent:
-        checks.refuse_empty(name, source)
+        checks.refuse_empty(name, log.source)

@@ -11,7 +11,7 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
-from terragrip.formats.conversion import Part
+from terragrip.formats.conversion import Part, converted
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
@@ -69,7 +69,7 @@ def read(
         return replace(recording, profiles=tuple(used.values()))
     if isinstance(profile, list | tuple):
         raise InputError("there are several profiles for one log", file=path, hint="give one profile")
-    chosen = _loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
+    chosen = loaded(profile)  # type: ignore[arg-type]  # a sequence was refused above
     if chosen is not None:
         return recording_of(read_table(path, chosen.wants, (*databases, *chosen.dbc)), chosen)
     return recording_of(read_table(path, is_own, databases), None)
@@ -83,7 +83,7 @@ def _of_frame(frame: Any, profile: Any) -> Recording:
     if isinstance(profile, list | tuple):
         raise InputError("there are several profiles for one table", hint="give one profile")
     columns = columns_of(frame, None)
-    return recording_of(LogTable(tuple(columns), columns), _loaded(profile))
+    return recording_of(LogTable(tuple(columns), columns), loaded(profile))
 
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
@@ -113,7 +113,7 @@ def read_channels(
     As `read`, but ``ground_speed`` and wheel speeds may be missing, the profile is applied to each log as far as possible, and
     columns whose names begin with one of ``also`` are kept as they are. Raises InputError as `read`.
     """
-    chosen = _loaded(profile)
+    chosen = loaded(profile)
     parts = [_part(path, chosen, tuple(dbc), also) for path in paths]
     if len(parts) == 1:
         return {TIME: parts[0].time, **parts[0].columns}
@@ -151,7 +151,8 @@ def read_log(path: PathLike, wanted: Wanted | None = None, databases: Databases 
     return table.whole(wanted)
 
 
-def _loaded(profile: Profile | PathLike | None) -> Profile | None:
+def loaded(profile: Profile | PathLike | None) -> Profile | None:
+    """A profile that is given as such, by its path or by its name; raises InputError as `Profile.load`."""
     return profile if profile is None or isinstance(profile, Profile) else Profile.load(profile)
 
 
@@ -162,8 +163,8 @@ def _each(
     if not paths:
         raise InputError("there is no log", hint="give at least one")
     if profile is None or isinstance(profile, Profile | str | os.PathLike):
-        return [_loaded(profile)] * len(paths)
-    result = [_loaded(own) for own in profile]
+        return [loaded(profile)] * len(paths)
+    result = [loaded(own) for own in profile]
     if len(result) != len(paths):
         raise InputError(
             f"there are {len(result)} profiles for {len(paths)} logs",
@@ -176,8 +177,6 @@ def _part(
     path: PathLike | LogTable, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()
 ) -> Part:
     """The channels of one of several sources; without a profile also columns whose names begin with one of ``also``."""
-    from terragrip.formats.conversion import converted
-
     def table_of(wanted: Wanted, every: Databases) -> LogTable:
         if isinstance(path, LogTable):
             return replace(path, columns={name: one for name, one in path.columns.items() if wanted(name)})

@@ -129,30 +129,28 @@ def _numbers(column: Any, missing: float) -> npt.NDArray[Any]:
     """Numbers as NumPy, not copied where they lie in one piece; what is missing becomes ``missing``."""
     import pyarrow as pa
 
-    dtype = np.dtype(column.type.to_pandas_dtype())
-    parts = []
-    for chunk in column.chunks if isinstance(column, pa.ChunkedArray) else [column]:
-        buffer = chunk.buffers()[1]
-        if buffer is None or not len(chunk):
-            parts.append(np.full(len(chunk), missing, dtype=dtype))
-            continue
-        values = np.frombuffer(buffer, dtype, count=len(chunk), offset=chunk.offset * dtype.itemsize)
-        if chunk.null_count:
-            absent = np.from_dlpack(chunk.is_null().cast(pa.int8())).astype(bool)
-            values = np.where(absent, np.asarray(missing, dtype=dtype), values)
-        parts.append(values)
-    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, dtype), *parts])
+    whole = _whole(column)
+    dtype = np.dtype(whole.type.to_pandas_dtype())
+    values = np.frombuffer(whole.buffers()[1] or b"", dtype)[whole.offset :][: len(whole)]
+    if not whole.null_count:
+        return values
+    absent = np.from_dlpack(whole.is_null().cast(pa.int8())).astype(bool)
+    return np.where(absent, np.asarray(missing, dtype=dtype), values)
 
 
 def _texts(column: Any) -> npt.NDArray[np.object_]:
     """Texts as objects, missing = None; equal texts share one string."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
+    coded = _whole(column.dictionary_encode())
+    words = np.array([*coded.dictionary.to_pylist(), None], dtype=object)
+    return words[_numbers(coded.indices, len(words) - 1)]
 
-    coded = pc.dictionary_encode(column)
-    chunks = coded.chunks if isinstance(coded, pa.ChunkedArray) else [coded]
-    parts = []
-    for chunk in chunks:
-        words = np.array([*chunk.dictionary.to_pylist(), None], dtype=object)
-        parts.append(words[_numbers(chunk.indices, len(words) - 1)])
-    return np.concatenate([np.empty(0, dtype=object), *parts])
+
+def _whole(column: Any) -> Any:
+    """A column in one piece."""
+    import pyarrow as pa
+
+    if not isinstance(column, pa.ChunkedArray):
+        return column
+    return (
+        column.combine_chunks() if column.num_chunks else pa.nulls(0, column.type)
+    )  # none to combine wakes pandas
