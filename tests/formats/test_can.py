@@ -264,7 +264,7 @@ def test_refusals(tmp_path: Path, dbc: Path) -> None:
         "None of the DBC's messages occurs in the log (Floats, Wheels)" in note for note in wrong.notes
     )
     (tmp_path / "broken.dbc").write_text("BO_ x\n")
-    with pytest.raises(InputError, match="is not a readable DBC"):
+    with pytest.raises(InputError, match="is a damaged DBC, or none"):
         read(tractor, "tractor-isobus", dbc=tmp_path / "broken.dbc")
     (tmp_path / "table.csv").write_text("time,a\n0,1\n")
     with pytest.raises(InputError, match="is a text table, which needs no DBC"):

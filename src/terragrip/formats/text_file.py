@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
-import zlib
 from typing import BinaryIO
 
 from terragrip.errors import InputError
 from terragrip.files import unreadable
+from terragrip.formats.boundary import reading
 
 _GZIP = b"\x1f\x8b"
 _RATIO = 200
@@ -38,17 +38,12 @@ def read(stream: BinaryIO, size: int, source: str) -> bytes:
 
     Raises InputError where the file is damaged, cannot be read, or unpacks to so much that it is no log: never more than that is held.
     """
-    try:
+    with reading(source, "gzip file" if isinstance(stream, gzip.GzipFile) else "text table"):
         if not isinstance(stream, gzip.GzipFile):
             return stream.read(size)
         most = _most(source)
         left = most - stream.tell() + 1
         data = stream.read(left if size < 0 else min(size, left))
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        problem = f"is a damaged gzip file ({error})"
-        raise InputError(problem, file=source, hint="copy or pack it again") from error
-    except OSError as error:
-        raise unreadable(source, error) from error
     if stream.tell() > most:
         packed = os.path.getsize(source)
         problem = f"unpacks to more than {most / 1e6:.0f} MB from {packed / 1e6:.3g} MB, unlike any log"

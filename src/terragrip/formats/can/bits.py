@@ -57,21 +57,20 @@ class Field:
 
 def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     """Raw values (n,) of a field in payloads (n, bytes); the payloads must reach to the field's last byte."""
-    result = np.zeros(len(data), dtype=np.uint64)
-    if field.little_endian:
-        first, last = field.start // 8, field.last_byte
-        shifts = [8 * (byte - first) - field.start % 8 for byte in range(first, last + 1)]
-    else:
-        position = 8 * (field.start // 8) + 7 - field.start % 8  # counted from the first byte's highest bit
-        first, last = position // 8, field.last_byte
-        trailing = 8 * last + 8 - position - field.length
-        shifts = [8 * (last - byte) - trailing for byte in range(first, last + 1)]
-    for byte, shift in zip(range(first, last + 1), shifts, strict=True):
-        part = data[:, byte].astype(np.uint64)
-        result |= part << np.uint64(shift) if shift >= 0 else part >> np.uint64(-shift)
-    if field.length < 64:
-        result &= np.uint64((1 << field.length) - 1)
-    return result
+    first = field.start // 8
+    low = (
+        field.start % 8 if field.little_endian else 7 - field.start % 8
+    )  # where its bits begin in its first byte
+    held = data[:, first : field.last_byte + 1]
+    bits = np.unpackbits(held, axis=1, bitorder="little" if field.little_endian else "big")[
+        :, low : low + field.length
+    ]
+    if not field.little_endian:
+        bits = bits[:, ::-1]
+    packed = np.packbits(bits, axis=1, bitorder="little")
+    words = np.zeros((len(data), 8), dtype=np.uint8)
+    words[:, : packed.shape[1]] = packed
+    return words.view("<u8")[:, 0].astype(np.uint64, copy=False)
 
 
 def physical(field: Field, raw: npt.NDArray[np.uint64]) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any
 from terragrip.document import read_yaml
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing
-from terragrip.formats.boundary import DAMAGE, needed
+from terragrip.formats.boundary import needed, reading
 from terragrip.formats.can.bits import Field
 
 EXTENDED = 1 << 31
@@ -51,32 +51,29 @@ class Catalog:
     """
 
     def __init__(self, messages: Iterable[Message], given: Iterable[Message] = ()) -> None:
-        self.by_identifier: dict[int, Message] = {}
-        self.by_group: dict[int, Message] = {}
+        self._table: dict[tuple[bool, int], Message] = {}
         self.differing: set[tuple[bool, int]] = set()
         for message in messages:
-            table = self.by_group if message.by_group else self.by_identifier
-            if table.setdefault(message.key, message).fields != message.fields:
-                self.differing.add((message.by_group, message.key))
+            place = message.by_group, message.key
+            if self._table.setdefault(place, message).fields != message.fields:
+                self.differing.add(place)
         names = Counter(message.name for message in self.messages)
-        for table in (self.by_identifier, self.by_group):
-            for key, message in table.items():
-                if names[message.name] > 1:
-                    table[key] = replace(message, name=f"{message.name}({key & ~EXTENDED:X})")
-        own = {(message.by_group, message.key) for message in given}
-        self.given = frozenset(m.name for m in self.messages if (m.by_group, m.key) in own)
+        for place, message in self._table.items():
+            if names[message.name] > 1:
+                self._table[place] = replace(message, name=f"{message.name}({message.key & ~EXTENDED:X})")
+        self.given = frozenset(self._table[message.by_group, message.key].name for message in given)
         self._seen = Counter(field.name for message in self.messages for field in message.fields)
 
     @property
     def messages(self) -> tuple[Message, ...]:
         """All messages."""
-        return (*self.by_identifier.values(), *self.by_group.values())
+        return tuple(self._table.values())
 
     def message_of(self, identifier: int) -> Message | None:
         """The message of a frame's identifier (`EXTENDED` set where it has 29 bits); None if it is unknown."""
-        result = self.by_identifier.get(identifier)
+        result = self._table.get((False, identifier))
         if result is None and identifier & EXTENDED:
-            result = self.by_group.get(group_of(identifier))
+            result = self._table.get((True, group_of(identifier)))
         return result
 
     def name(self, message: Message, field: Field) -> str:
@@ -124,13 +121,9 @@ def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
     file = os.fspath(path)
     refuse_missing(file, suffixes=(".dbc", ".kcd", ".sym", ".arxml"))
     cantools = needed("cantools", "a DBC")
-    errors = (*DAMAGE, cantools.Error, needed("textparser", "a DBC").Error)
-    try:
+    with reading(file, "DBC", cantools.Error, needed("textparser", "a DBC").Error):
         database = cantools.database.load_file(file, strict=False, cache_dir=None)
         result = [message_of(database, message) for message in database.messages]
-    except errors as error:
-        sentence = " ".join(str(error).split())[:120]
-        raise InputError(f"is not a readable DBC ({sentence})", file=file, hint="export it again") from error
     if not result:
         raise InputError("describes no message", file=file, hint="give the DBC of the machine's bus")
     return result
