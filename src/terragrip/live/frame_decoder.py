@@ -8,7 +8,6 @@ import numpy as np
 
 from terragrip.formats.can.bits import decode
 from terragrip.formats.can.catalog import EXTENDED, Message, catalog, source_of
-from terragrip.formats.can.frames import of_sender
 from terragrip.formats.can.transport import Transport, is_part
 from terragrip.live.payload import Fields
 
@@ -67,9 +66,6 @@ class FrameDecoder:
         message = self._catalog.message_of(key)
         if message is None:
             return None
-        names = {}
-        for field in message.fields:
-            own = self._catalog.name(message, field)
-            every = (own, of_sender(own, source_of(key))) if message.by_group else (own,)
-            names[field.name] = [name for name in every if self._wants(name)]
-        return message, {field: wanted for field, wanted in names.items() if wanted}
+        names = self._catalog.names(message, source_of(key))
+        wanted = {field: [name for name in every if self._wants(name)] for field, every in names.items()}
+        return message, {field: own for field, own in wanted.items() if own}

@@ -57,17 +57,11 @@ class Field:
 
 def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     """Raw values (n,) of a field in payloads (n, bytes); the payloads must reach to the field's last byte."""
-    first = field.start // 8
-    low = (
-        field.start % 8 if field.little_endian else 7 - field.start % 8
-    )  # where its bits begin in its first byte
-    held = data[:, first : field.last_byte + 1]
-    bits = np.unpackbits(held, axis=1, bitorder="little" if field.little_endian else "big")[
-        :, low : low + field.length
-    ]
-    if not field.little_endian:
-        bits = bits[:, ::-1]
-    packed = np.packbits(bits, axis=1, bitorder="little")
+    little = field.little_endian
+    low = field.start % 8 if little else 7 - field.start % 8  # where its bits begin in its first byte
+    held = data[:, field.start // 8 : field.last_byte + 1]
+    bits = np.unpackbits(held, axis=1, bitorder="little" if little else "big")[:, low : low + field.length]
+    packed = np.packbits(bits if little else bits[:, ::-1], axis=1, bitorder="little")
     words = np.zeros((len(data), 8), dtype=np.uint8)
     words[:, : packed.shape[1]] = packed
     return words.view("<u8")[:, 0].astype(np.uint64, copy=False)

@@ -42,6 +42,11 @@ def source_of(identifier: int) -> int:
     return identifier & 0xFF
 
 
+def of_sender(name: str, sender: int) -> str:
+    """The name of one sender's signal: ``Name@F0``."""
+    return f"{name}@{sender:02X}"
+
+
 class Catalog:
     """Messages by identifier and by parameter group; the first of equals counts.
 
@@ -79,6 +84,11 @@ class Catalog:
     def name(self, message: Message, field: Field) -> str:
         """The name of a signal in a log."""
         return field.name if self._seen[field.name] == 1 else f"{message.name}.{field.name}"
+
+    def names(self, message: Message, sender: int) -> dict[str, tuple[str, ...]]:
+        """By a message's fields the names of their signals: the plain one, and of a parameter group that of its sender."""
+        plain = {field.name: self.name(message, field) for field in message.fields}
+        return {f: (n, of_sender(n, sender)) if message.by_group else (n,) for f, n in plain.items()}
 
 
 def catalog(databases: Sequence[str | os.PathLike[str]] = ()) -> Catalog:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from terragrip.formats.can.bits import decode
-from terragrip.formats.can.catalog import EXTENDED, Message, group_of
-from terragrip.formats.can.frames import NO_SENDER, Block, Frames, of_sender
+from terragrip.formats.can.catalog import EXTENDED, Message, group_of, of_sender
+from terragrip.formats.can.frames import Block, Frames
 from terragrip.formats.signals import Signal
 
 
@@ -56,12 +56,8 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
 
 
 def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -> dict[str, Signal]:
-    names = {f.name: frames.catalog.name(message, f) for f in message.fields}
-    wanted = {
-        field
-        for field, name in names.items()
-        if frames.wanted(name) or (sender != NO_SENDER and frames.wanted(of_sender(name, sender)))
-    }
+    names = frames.catalog.names(message, sender)
+    wanted = {field for field, every in names.items() if any(map(frames.wanted, every))}
     time, lengths = (np.concatenate([block[k] for block in kept]) for k in (0, 1))
     data = np.zeros((len(time), int(lengths.max())), np.uint8)
     row = 0
@@ -72,7 +68,7 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
     values = decode(message.fields, wanted, data, lengths)
     time = time if frames.tick == 1.0 else time * frames.tick
     units = {f.name: f.unit for f in message.fields}
-    return {names[field]: Signal(time, column, units[field]) for field, column in values.items()}
+    return {names[field][0]: Signal(time, column, units[field]) for field, column in values.items()}
 
 
 def _on_senders(best: dict[str, tuple[int, int]], several: set[str]) -> list[str]:

@@ -25,11 +25,6 @@ Route = list[Block] | Transport | None
 """Where frames are kept, or what puts them together as parts of longer messages; None where no signal of them is wanted."""
 
 
-def of_sender(name: str, sender: int) -> str:
-    """The name of one sender's signal: ``Name@F0``."""
-    return f"{name}@{sender:02X}"
-
-
 @dataclass
 class Frames:
     """Takes the frames of a log and keeps those of wanted signals.
@@ -136,9 +131,8 @@ class Frames:
             return None
         sender = source_of(identifier) if message.by_group else NO_SENDER
         self.seen[message.name, sender] = message
-        names = [self.catalog.name(message, f) for f in message.fields]
-        own = names if sender == NO_SENDER else [of_sender(name, sender) for name in names]
-        if not any(map(self.wanted, (*names, *own))):
+        names = self.catalog.names(message, sender).values()
+        if not any(self.wanted(name) for every in names for name in every):
             return None
         return self.kept.setdefault((message.name, sender), [])
 
