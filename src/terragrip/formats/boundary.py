@@ -50,7 +50,9 @@ def needed(module: str, what: str) -> Any:
 
 
 @contextmanager
-def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception]) -> Iterator[None]:
+def reading(
+    source: str | os.PathLike[str], kind: str, *errors: type[Exception], hint: str = "copy or record it again"
+) -> Iterator[None]:
     """Turn what a library raises on a damaged file into an InputError that says so.
 
     ``errors`` are the library's own exceptions, beside those of broken bytes. Its warnings are silenced: they
@@ -64,9 +66,7 @@ def reading(source: str | os.PathLike[str], kind: str, *errors: type[Exception])
         raise
     except (*DAMAGE, *errors) as error:
         sentence = " ".join(str(error).split())[:100] or type(error).__name__
-        raise InputError(
-            f"is a damaged {kind}, or none ({sentence})", file=source, hint="copy or record it again"
-        ) from error
+        raise InputError(f"is a damaged {kind}, or none ({sentence})", file=source, hint=hint) from error
 
 
 @dataclass

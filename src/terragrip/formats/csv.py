@@ -53,9 +53,10 @@ def csv_on_disk(path: str) -> TableOnDisk:
                 continue
             text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
             # A byte order mark, comments and the header stand in the first block only.
-            body, remarks = body_of(text, dialect, dialect.start if is_first else 0, more=not is_first)
+            start = dialect.start if is_first else 0
+            body, written, remarks = body_of(text, dialect, start, more=not is_first)
             notes.extend(remarks)
-            columns = parse(body, dialect, chosen, path, row)
+            columns = parse(body, written, chosen, path, row)
             row += max((len(column) for column in columns.values()), default=0)
             yield columns
 

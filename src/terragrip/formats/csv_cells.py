@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,8 +28,9 @@ _MISSING = [
 
 def body_of(
     data: bytes, dialect: Dialect, start: int, *, more: bool = False
-) -> tuple[bytes | memoryview, list[str]]:
-    """The rows from ``start`` on; a last line that was cut off while writing is left out, with a note.
+) -> tuple[bytes | memoryview, Dialect, list[str]]:
+    """The rows from ``start`` on, how they are then written, and notes: a last line that was cut off while writing is left out, runs
+    of blanks become tabs.
 
     ``more``: there are rows before these.
     """
@@ -42,7 +44,8 @@ def body_of(
             notes.append("The last row is cut off and was left out.")
     if dialect.separator == " ":
         body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
-    return body, notes
+        dialect = replace(dialect, separator="\t")
+    return body, dialect, notes
 
 
 def parse(
@@ -87,7 +90,7 @@ def _as_times(name: str, column: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def _is_number_column(name: str, body: bytes | memoryview, dialect: Dialect, index: int) -> bool:
     if name == TIME:  # may be dates: leave those to Arrow
         line = bytes(body[:4096]).lstrip().partition(b"\n")[0].decode("utf-8", "replace")
-        cells = split(line, "\t" if dialect.separator == " " else dialect.separator)
+        cells = split(line, dialect.separator)
         return not (index < len(cells) and re.match(r"\d{4}-\d\d-\d\d", cells[index]))
     return is_channel(name)
 
@@ -100,14 +103,13 @@ def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types:
     import pyarrow as pa
     from pyarrow import csv
 
-    separator = "\t" if dialect.separator == " " else dialect.separator
     return csv.read_csv(
         pa.BufferReader(pa.py_buffer(body)),
         # Threads of a read that failed may still start while the process ends, and abort it (apache/arrow#34314).
         read_options=csv.ReadOptions(
             column_names=[_field(k) for k in range(len(dialect.names))], use_threads=False
         ),
-        parse_options=csv.ParseOptions(delimiter=separator),
+        parse_options=csv.ParseOptions(delimiter=dialect.separator),
         convert_options=csv.ConvertOptions(
             column_types=types,
             include_columns=[_field(k) for k in chosen],
@@ -132,10 +134,10 @@ def _arrow_of_texts(
 
 def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first: int) -> InputError:
     """The InputError that names the first row of another width than the header."""
-    separator, width = "\t" if dialect.separator == " " else dialect.separator, len(dialect.names)
     lines = (line for line in body.decode("utf-8", "replace").splitlines() if line.strip())
+    width = len(dialect.names)
     for row, line in enumerate(lines, start=first + 1):
-        cells = len(split(line, separator))
+        cells = len(split(line, dialect.separator))
         if cells != width:
             problem = f"has {cells} cells, the header {width}"
             return InputError(
@@ -162,7 +164,7 @@ def _numbers_of_texts(
     result = np.full(len(cells), np.nan)
     doubtful = _doubtful(cells, dialect.decimal)
     for row, cell in enumerate(cells):
-        number = None if row == doubtful else _number(cell)
+        number = None if row == doubtful else number_in(cell)
         if number is not None:
             result[row] = number
         elif cell is not None and is_own:
@@ -186,7 +188,7 @@ def _without_unit(cells: list[str | None], unit: str, name: str, first: int, sou
     return [cell.removesuffix(unit).strip() if cell is not None and unit_in(cell) else cell for cell in cells]
 
 
-def _number(cell: str | None) -> float | None:
+def number_in(cell: str | None) -> float | None:
     """The number in a cell by either decimal sign, NaN in an empty one; None where there is another text."""
     try:
         return np.nan if cell is None else float(cell.replace(",", "."))

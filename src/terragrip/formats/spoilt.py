@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
+from terragrip.formats.csv_cells import number_in
 from terragrip.formats.vocabulary import Vocabulary
 from terragrip.recording.schema import LABELS
 from terragrip.thousands import complaint
@@ -49,7 +50,7 @@ def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, t
 def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:
     """A sentence where most of the cells are numbers: on the first that is none, or on their decimal comma."""
     known = [(row, cell) for row, cell in enumerate(cells) if cell]
-    good = {cell: _is_number(cell.replace(",", ".")) for cell in {cell for _, cell in known}}
+    good = {cell: number_in(cell) is not None for cell in {cell for _, cell in known}}
     if not known or np.mean([good[cell] or complaint(cell) is not None for _, cell in known]) <= _MOST:
         return
     bad = next(((row, cell) for row, cell in known if not good[cell]), None)
@@ -63,11 +64,3 @@ def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:
         "leave it empty, or correct it",
     )
     yield f"column {name}, row {bad[0] + 1}{others}: {problem}; {hint}."
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True

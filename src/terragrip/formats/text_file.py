@@ -38,15 +38,16 @@ def read(stream: BinaryIO, size: int, source: str) -> bytes:
 
     Raises InputError where the file is damaged, cannot be read, or unpacks to so much that it is no log: never more than that is held.
     """
-    with reading(source, "gzip file" if isinstance(stream, gzip.GzipFile) else "text table"):
-        if not isinstance(stream, gzip.GzipFile):
+    packed = isinstance(stream, gzip.GzipFile)
+    with reading(source, "gzip file" if packed else "text table", hint="copy or pack it again"):
+        if not packed:
             return stream.read(size)
         most = _most(source)
         left = most - stream.tell() + 1
         data = stream.read(left if size < 0 else min(size, left))
     if stream.tell() > most:
-        packed = os.path.getsize(source)
-        problem = f"unpacks to more than {most / 1e6:.0f} MB from {packed / 1e6:.3g} MB, unlike any log"
+        held = os.path.getsize(source)
+        problem = f"unpacks to more than {most / 1e6:.0f} MB from {held / 1e6:.3g} MB, unlike any log"
         raise InputError(
             problem, file=source, hint="if it is a log, unpack it with 'gunzip' and give the text"
         )

@@ -131,7 +131,8 @@ def _read_dbc(path: str | os.PathLike[str]) -> list[Message]:
     file = os.fspath(path)
     refuse_missing(file, suffixes=(".dbc", ".kcd", ".sym", ".arxml"))
     cantools = needed("cantools", "a DBC")
-    with reading(file, "DBC", cantools.Error, needed("textparser", "a DBC").Error):
+    errors = cantools.Error, needed("textparser", "a DBC").Error
+    with reading(file, "DBC", *errors, hint="export it again"):
         database = cantools.database.load_file(file, strict=False, cache_dir=None)
         result = [message_of(database, message) for message in database.messages]
     if not result:
