@@ -237,7 +237,7 @@ def test_a_text_that_is_none_costs_its_message_alone(tmp_path: Path) -> None:
 
 def test_an_integer_beyond_all_numbers_leaves_the_others_in_their_places() -> None:
     """JSON has integers of any size."""
-    topic = Topic("t", None)
+    topic = Topic("t")
     for k, value in enumerate((1, 10**400, 2)):
         topic.push(float(k), b"", lambda _, value=value: (None, {"t.x": value}))
     assert topic.strange == 1

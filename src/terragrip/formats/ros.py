@@ -85,24 +85,13 @@ def _collect(file: Path, wanted: Wanted, topics: dict[str, Topic], types: Types,
         closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base,
     ):
         known = _topics_of(base, wanted, topics, types)
-        last = -1
-        while True:
-            # A topic of which nothing is wanted is asked for no more: its images are not even read.
-            asked = ", ".join(str(number) for number, (topic, _) in known.items() if topic.is_wanted)
-            rows = base.execute(
-                "SELECT rowid, topic_id, timestamp, data FROM messages "
-                f"WHERE rowid > ? AND topic_id IN ({asked}) ORDER BY rowid",
-                (last,),
-            )
-            for place, number, receipt, raw in rows:
-                seen.messages += 1
-                topic, decode = known[number]
-                topic.push(receipt * 1e-9, raw, decode)
-                if not topic.is_wanted:
-                    last = place
-                    break
-            else:
-                break
+        # Asked of each row before its message is looked at: images of which nothing is wanted are not even read.
+        base.create_function("is_wanted", 1, lambda number: number in known and known[number][0].is_wanted)
+        rows = "SELECT topic_id, timestamp, data FROM messages WHERE is_wanted(topic_id) ORDER BY rowid"
+        for number, receipt, content in base.execute(rows):
+            seen.messages += 1
+            topic, decode = known[number]
+            topic.push(receipt * 1e-9, content, decode)
 
 
 def _topics_of(
