@@ -21,7 +21,6 @@ STREAM = "#sigstream#"
 """The group of a file that holds its records."""
 _CLASSES = {"double": "f8", "single": "f4", "half": "f2", "logical": "u1", "boolean": "u1", "int8": "i1", "uint8": "u1",
             "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8"}  # fmt: skip
-_OF_SIZE = {1: "1", 2: "2", 4: "4", 8: "8"}
 _FIXED = ("fixed-point", "scaled-double")
 _WIDEST = 1 << 16  # numbers of a sample
 _DAYS_TO_1970, _DAY = 719_529.0, 86_400.0
@@ -138,7 +137,7 @@ def _fixed_kind(about: Mapping[str, Any], size: int) -> str:
         return "f8"
     parameters = about.get("FixedPointParameters")
     signed = isinstance(parameters, Mapping) and _true(parameters.get("isSigned"))
-    return ("i" if signed else "u") + _OF_SIZE[size]
+    return f"{'i' if signed else 'u'}{size}"
 
 
 def _fixed_point(about: Mapping[str, Any]) -> tuple[float, float]:

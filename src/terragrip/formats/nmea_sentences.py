@@ -16,6 +16,14 @@ _OURS = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA),[^$!*\r\n]{0,120}\*[0-9A-Fa-f]{2}")
 _BEGUN = re.compile(r"\$[A-Z]{2}(RMC|VTG|GGA)")
 _KNOT, _KMH = factor_to("knot", "m/s"), factor_to("km/h", "m/s")
 
+_FIELDS = {  # of each kind: our name, pynmea2's, and the factor to our unit; of two ways to a name the first that is there counts
+    "RMC": (("ground_speed", "spd_over_grnd", _KNOT), ("course", "true_course", 1.0),
+            ("latitude", "latitude", 1.0), ("longitude", "longitude", 1.0)),
+    "VTG": (("ground_speed", "spd_over_grnd_kmph", _KMH), ("ground_speed", "spd_over_grnd_kts", _KNOT),
+            ("course", "true_track", 1.0)),
+    "GGA": (("latitude", "latitude", 1.0), ("longitude", "longitude", 1.0), ("altitude", "altitude", 1.0),
+            ("hdop", "horizontal_dil", 1.0), ("quality", "gps_qual", 1.0), ("satellites", "num_sats", 1.0)),
+}  # fmt: skip
 UNITS = {
     "ground_speed": "m/s",
     "course": "deg",
@@ -51,7 +59,7 @@ def sentences(line: str) -> tuple[list[Sentence], int]:
     good, damaged = [], 0
     for match in matches:
         try:
-            good.append(_READERS[match[1]](pynmea2.parse(match[0], check=True)))
+            good.append(_read(match[1], pynmea2.parse(match[0], check=True)))
         except (pynmea2.ParseError, ValueError, TypeError, AttributeError, ArithmeticError):
             damaged += 1
     return good, damaged
@@ -62,56 +70,23 @@ def _pynmea2() -> Any:
     return needed("pynmea2", "NMEA 0183")
 
 
-def _rmc(sentence: Any) -> Sentence:
-    clock, date = _clock(sentence.timestamp), _date(sentence.datestamp)
-    if sentence.status != "A":
-        return Sentence("RMC", clock, date, has_fix=False)
-    fields = {
-        "ground_speed": _number(sentence.spd_over_grnd, _KNOT),
-        "course": _number(sentence.true_course),
-        "latitude": sentence.latitude,
-        "longitude": sentence.longitude,
-    }
-    return Sentence("RMC", clock, date, fields=_known(fields))
+def _read(kind: str, sentence: Any) -> Sentence:
+    clock, date = getattr(sentence, "timestamp", None), getattr(sentence, "datestamp", None)
+    clock, date = clock if isinstance(clock, dt.time) else None, date if isinstance(date, dt.date) else None
+    if not _has_fix(kind, sentence):
+        return Sentence(kind, clock, date, has_fix=False)
+    fields: dict[str, float] = {}
+    for name, attribute, factor in _FIELDS[kind]:
+        value = _number(getattr(sentence, attribute), factor)
+        if value is not None:
+            fields.setdefault(name, value)
+    return Sentence(kind, clock, date, fields=fields)
 
 
-def _vtg(sentence: Any) -> Sentence:
-    if getattr(sentence, "faa_mode", "A") == "N":
-        return Sentence("VTG", has_fix=False)
-    speed = _number(sentence.spd_over_grnd_kmph, _KMH)
-    if speed is None:
-        speed = _number(sentence.spd_over_grnd_kts, _KNOT)
-    return Sentence("VTG", fields=_known({"ground_speed": speed, "course": _number(sentence.true_track)}))
-
-
-def _gga(sentence: Any) -> Sentence:
-    clock, quality = _clock(sentence.timestamp), _number(sentence.gps_qual)
-    if not quality:
-        return Sentence("GGA", clock, has_fix=False)
-    fields = {
-        "latitude": sentence.latitude,
-        "longitude": sentence.longitude,
-        "altitude": _number(sentence.altitude),
-        "hdop": _number(sentence.horizontal_dil),
-        "quality": quality,
-        "satellites": _number(sentence.num_sats),
-    }
-    return Sentence("GGA", clock, fields=_known(fields))
-
-
-_READERS = {"RMC": _rmc, "VTG": _vtg, "GGA": _gga}
-
-
-def _known(fields: dict[str, float | None]) -> dict[str, float]:
-    return {name: value for name, value in fields.items() if value is not None}
-
-
-def _clock(value: object) -> dt.time | None:
-    return value if isinstance(value, dt.time) else None
-
-
-def _date(value: object) -> dt.date | None:
-    return value if isinstance(value, dt.date) else None
+def _has_fix(kind: str, sentence: Any) -> bool:
+    if kind == "RMC":
+        return bool(sentence.status == "A")
+    return getattr(sentence, "faa_mode", "A") != "N" if kind == "VTG" else bool(_number(sentence.gps_qual))
 
 
 def _number(value: Any, factor: float = 1.0) -> float | None:

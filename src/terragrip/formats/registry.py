@@ -6,6 +6,7 @@ group ``terragrip.formats`` (docs/formats.md has an example).
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -101,11 +102,9 @@ def format_of(path: str | os.PathLike[str]) -> Format:
             head = stream.read(_HEAD)
     except OSError as error:
         raise unreadable(path, error) from error
-    result = next((one for one in known.values() if head.startswith(one.magic)), None)
-    if result is None:
-        result = next(
-            (one for one in known.values() if one.recognises is not None and one.recognises(head)), None
-        )
+    by_magic = (one for one in known.values() if head.startswith(one.magic))
+    by_look = (one for one in known.values() if one.recognises is not None and one.recognises(head))
+    result = next(itertools.chain(by_magic, by_look), None)
     if result is not None:
         return result
     # Nothing tells. Of a file that is no text, the name says which reader shall say what is wrong; a text is a table, unless another

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import bz2
 import io
+import itertools
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -22,6 +23,8 @@ _TIME, _PLACE = struct.Struct("<II"), struct.Struct("<Q")
 
 Message = tuple[int, float, bytes]
 """A message: its connection, when it was received [s], its content."""
+Record = tuple[int, dict[bytes, bytes], bytes, bool]
+"""Kind, fields and content of a record, and whether that is whole."""
 
 
 @dataclass(frozen=True)
@@ -42,48 +45,46 @@ def records(stream: BinaryIO, notes: list[str]) -> Iterator[Connection | Message
     if stream.read(len(_MAGIC)) != _MAGIC:
         raise ValueError("it does not begin as ROS 1 bags do")
     damaged = 0
-    while (record := _next(stream)) is not None:
-        kind, fields, content, whole = record
+    for kind, fields, content, whole in _records(stream):
         if kind == _BAG and whole:
             yield from _indexed(stream, fields)
-        if kind == _CHUNK and (whole or fields[b"compression"] == b"none"):
+        elif kind == _CHUNK and (whole or fields[b"compression"] == b"none"):
             try:
-                yield from _inner(_unpacked(fields, content))
+                yield from _contents(_records(io.BytesIO(_unpacked(fields, content))))
             except DAMAGE:
                 damaged += whole
-        if not whole:
-            raise ValueError("it ends within a record")
-        if kind in (_MESSAGE, _CONNECTION):
-            yield _record(kind, fields, content)
+        elif whole:
+            yield from _contents([(kind, fields, content, whole)])
     if damaged:
         notes.append(f"{damaged} chunks are damaged; their unreadable parts were left out.")
 
 
-def _next(stream: BinaryIO) -> tuple[int, dict[bytes, bytes], bytes, bool] | None:
-    """Kind, fields and content of the next record, and whether that is whole; None at the end."""
-    head = stream.read(_LENGTH.size)
-    if not head:
-        return None
-    (length,) = _LENGTH.unpack(head)
-    if length > _LONGEST_HEADER:
-        raise ValueError("a record's header has over 64 KiB")
-    fields = _fields(_exactly(stream, length))
-    (size,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
-    if size > LARGEST:
-        raise ValueError("a record of over 1 GiB")
-    content = stream.read(size)
-    return fields[b"op"][0], fields, content, len(content) == size
+def _records(stream: BinaryIO) -> Iterator[Record]:
+    """The records up to the end, the last of which may not be whole; raises ValueError behind such a one."""
+    while head := stream.read(_LENGTH.size):
+        (length,) = _LENGTH.unpack(head)
+        if length > _LONGEST_HEADER:
+            raise ValueError("a record's header has over 64 KiB")
+        fields = _fields(_exactly(stream, length))
+        (size,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
+        if size > LARGEST:
+            raise ValueError("a record of over 1 GiB")
+        content = stream.read(size)
+        yield fields[b"op"][0], fields, content, len(content) == size
+        if len(content) < size:
+            raise ValueError("it ends within a record")
 
 
-def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connection]:
+def _indexed(stream: BinaryIO, fields: dict[bytes, bytes]) -> Iterator[Connection | Message]:
     """The connections that the index at the end repeats, if there is one: the chunk that named them first may be damaged."""
     here = stream.tell()
     try:
         (place,) = _PLACE.unpack(fields.get(b"index_pos", bytes(8)))
         if here < place < stream.seek(0, 2):
             stream.seek(place)
-            while (record := _next(stream)) is not None and record[0] == _CONNECTION:
-                yield _connection(*record[1:3])
+            yield from _contents(
+                itertools.takewhile(lambda record: record[0] == _CONNECTION, _records(stream))
+            )
     except DAMAGE:
         pass  # the records before it tell, too
     finally:
@@ -125,23 +126,15 @@ def _unpacked(fields: dict[bytes, bytes], content: bytes) -> bytes:
     return content
 
 
-def _inner(content: bytes) -> Iterator[Connection | Message]:
-    """The records in a chunk; raises as `records` does."""
-    stream = io.BytesIO(content)
-    while (record := _next(stream)) is not None:
-        kind, fields, inside, whole = record
-        if not whole:
-            raise ValueError("a record reaches beyond its chunk")
-        if kind in (_MESSAGE, _CONNECTION):
-            yield _record(kind, fields, inside)
-
-
-def _record(kind: int, fields: dict[bytes, bytes], content: bytes) -> Connection | Message:
-    if kind == _CONNECTION:
-        return _connection(fields, content)
-    (number,) = _LENGTH.unpack(fields[b"conn"])
-    seconds, rest = _TIME.unpack(fields[b"time"])
-    return number, seconds + 1e-9 * rest, content
+def _contents(records: Iterable[Record]) -> Iterator[Connection | Message]:
+    """The connections and messages among records that are whole."""
+    for kind, fields, content, whole in records:
+        if whole and kind == _CONNECTION:
+            yield _connection(fields, content)
+        elif whole and kind == _MESSAGE:
+            (number,) = _LENGTH.unpack(fields[b"conn"])
+            seconds, rest = _TIME.unpack(fields[b"time"])
+            yield number, seconds + 1e-9 * rest, content
 
 
 def _connection(fields: dict[bytes, bytes], content: bytes) -> Connection:

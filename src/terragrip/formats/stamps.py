@@ -40,11 +40,10 @@ class Stamps:
         stamps = table.columns[self.column][: _FIRST + 1]
         if stamps.dtype.kind not in "fiuM" or len(stamps) < 2:
             return table
-        tick = factor_to(self.unit, "s") if stamps.dtype.kind != "M" else 1.0
-        steps = np.diff(stamps.astype(np.float64) if stamps.dtype.kind != "M" else stamps)
-        seconds = steps / np.timedelta64(1, "s") if stamps.dtype.kind == "M" else steps * tick
+        tick = np.timedelta64(1, "s") if stamps.dtype.kind == "M" else 1.0 / factor_to(self.unit, "s")
         with np.errstate(invalid="ignore"):
-            jumps = np.flatnonzero(seconds > SINCE_1970)
+            steps = np.diff(stamps if stamps.dtype.kind == "M" else stamps.astype(np.float64)) / tick
+            jumps = np.flatnonzero(steps > SINCE_1970)
         if not len(jumps):
             return table
         count = int(jumps[-1]) + 1

@@ -109,19 +109,9 @@ def _group(number: int, entry: dict[str, Any]) -> Message:
     fields = []
     for name, place in entry["fields"].items():
         byte, _, bit = str(place["at"]).partition(".")
-        fields.append(
-            Field(
-                name=name,
-                start=8 * (int(byte) - 1) + int(bit or 1) - 1,
-                length=place["bits"],
-                signed=place.get("signed", False),
-                scale=place.get("scale", 1.0),
-                offset=place.get("offset", 0.0),
-                unit=place.get("unit"),
-                codes=True,
-                reverse=place.get("reverse"),
-            )
-        )
+        start = 8 * (int(byte) - 1) + int(bit or 1) - 1
+        about = {key: value for key, value in place.items() if key != "at"}
+        fields.append(Field(name, start, codes=True, **about))
     length = max(8, max(field.last_byte for field in fields) + 1)
     return Message(entry["name"], number, tuple(fields), length, by_group=True)
 

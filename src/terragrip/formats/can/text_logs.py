@@ -43,15 +43,9 @@ _BACK, _LONGEST_STEP = 0.2, 1e6  # steps run back often, and are short
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
 _BITS = 29  # of an identifier at most
 
-_TIMES = {
-    "timestamp": 1.0,
-    "time": 1.0,
-    "timestampepoch": 1.0,
-    "time_s": 1.0,
-    "t": 1.0,
-    "time_ms": 1e-3,
-    "timems": 1e-3,
-}
+_TIMES = dict.fromkeys(("timestamp", "time", "timestampepoch", "time_s", "t"), 1.0) | dict.fromkeys(
+    ("time_ms", "timems"), 1e-3
+)
 _IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
 _DATA = ("data", "databytes", "payload", "data_hex")
 _SOURCES, _EXTENDED = ("source", "src", "sa"), ("extended", "ide")
@@ -184,7 +178,7 @@ def _by_python_can(
     name: str, lines: Iterable[Numbered], count: Count, remark: re.Pattern[str]
 ) -> Iterator[Frame]:
     """Frames by a reader of python-can, which goes on behind lines that it cannot read; those are counted, but for a ``remark``."""
-    can = needed("can", f"a log by {name}")
+    can = needed("can", "an ASC or TRC log")
     reader = getattr(can, name)(io.StringIO())
     number, shown, in_doubt = 0, "", False
 
