@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import can
+import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 from rosbags.rosbag2 import StoragePlugin
@@ -30,8 +32,15 @@ def matlab_5(path: Path, packed: bool) -> Path:
     return path
 
 
+def parquet(path: Path) -> Path:
+    time = np.arange(50.0)
+    pd.DataFrame({"time": time, "ground_speed": time, "wheel_speed_a": time, "soil": "x"}).to_parquet(path)
+    return path
+
+
 SAMPLES: dict[str, Callable[[Path], Path]] = {
     **{s: lambda d, s=s: write_log(d / f"log.{s}", drive(1000, 5.0).frames) for s in ("blf", "asc", "trc", "log", "csv")},
+    "parquet": lambda d: parquet(d / "log.parquet"),
     "nmea": lambda d: write_nmea(d / "log.nmea"),
     "ros1": lambda d: write_ros1(d / "log.bag"),
     "sqlite": lambda d: next(write_ros2(d / "bag", StoragePlugin.SQLITE3, ("/joint_states",)).glob("*.db3")),

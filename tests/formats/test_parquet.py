@@ -1,4 +1,4 @@
-"""Parquet: whole, in blocks, and damaged."""
+"""Parquet: whole and in blocks."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from terragrip.errors import InputError
 from terragrip.formats import Profile, inspect, parquet, read
@@ -141,29 +139,6 @@ def test_a_column_of_lists_is_refused(tmp_path: Path, log: pd.DataFrame) -> None
     pq.write_table(table, path)
     with pytest.raises(InputError, match=r"column ground_speed: has list<.*>, not numbers"):
         read(path)
-
-
-@settings(max_examples=150)
-@given(st.data())
-def test_a_damaged_file_is_a_recording_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    folder = tmp_path_factory.mktemp("damage")
-    time = np.arange(50.0)
-    frame = pd.DataFrame({"time": time, "ground_speed": time, "wheel_speed_a": time, "soil": "x"})
-    content = bytearray(put(folder, frame).read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(4, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = folder / "log.parquet"
-    path.write_bytes(content[: data.draw(st.integers(4, len(content)))])
-    try:
-        recording = read(path)
-    except InputError as refusal:
-        message = str(refusal)
-    else:
-        assert np.all(np.diff(recording.time) > 0)
-        return
-    assert "\n" not in message
 
 
 def test_one_long_row_group_is_not_held_in_memory(tmp_path: Path) -> None:

@@ -177,6 +177,7 @@ def _part(
     path: PathLike | LogTable, profile: Profile | None, databases: Databases, also: tuple[str, ...] = ()
 ) -> Part:
     """The channels of one of several sources; without a profile also columns whose names begin with one of ``also``."""
+
     def table_of(wanted: Wanted, every: Databases) -> LogTable:
         if isinstance(path, LogTable):
             return replace(path, columns={name: one for name, one in path.columns.items() if wanted(name)})
