@@ -92,6 +92,19 @@ def test_a_library_given_is_what_is_shown(
     assert "hard: not fitted, the library does not contain it" in html
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_runs_without_labels_show_the_library_that_is_given(tmp_path: Path) -> None:
+    """The studio learns the curve of an unlabelled log under a name and writes the report: it had no curve, for want of a label."""
+    made_up.estimates(1000, ("",), rows=300).write(tmp_path / "run.parquet")
+    SoilLibrary({"field": Soil("field", "exponential", {"a": 0.777})}).write(tmp_path / "soils.json")
+    for words, has_curve in ((["--library", str(tmp_path / "soils.json")], True), ([], False)):
+        words = ["report", str(tmp_path / "run.parquet"), *words, "-o", str(tmp_path / "report.html")]
+        assert main([*words, "--no-pdf", "--quiet"]) == 0
+        html = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert ("0.777" in html, "no soil label, so no curve" in html) == (has_curve, not has_curve)
+        assert "The same from" not in html  # a short run has no part to look at closely
+
+
 def test_the_pdf_is_drawn_with_text_and_brings_its_fonts(report: Path) -> None:
     pdf = (report / "report.pdf").read_bytes()
     assert pdf.startswith(b"%PDF-")

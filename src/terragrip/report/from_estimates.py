@@ -72,6 +72,9 @@ class _Summary:
         return summary.Driven(self.name, self.duration, self.distance, self.began)
 
 
+_UNLABELLED = "no soil label, so no curve can be learned (a column soil)"
+
+
 @dataclass
 class _Gathered:
     """The content of all runs, gathered file by file."""
@@ -95,8 +98,8 @@ def report_of(
 ) -> Page:
     """The report of estimates files (Parquet, written by `terragrip estimate`).
 
-    library: soils as `terragrip soils` learned them, which are shown; without it they are learned here, by the same
-    settings. grounds: of ground.json (`terragrip ground`).
+    library: soils as `terragrip soils` learned them, of which those are shown that the runs are labelled with or the grounds name,
+    all where neither does; without it they are learned here, by the same settings. grounds: of ground.json (`terragrip ground`).
     progress: called with steps done and steps in all.
     Raises InputError on a file that is no table of estimates or is given twice; whatever else is absent leaves its section out.
     """
@@ -111,7 +114,13 @@ def report_of(
     summaries, shown, gathered, happened = read.summaries, read.shown, read.gathered, read.events
     campaign = Campaign({}, {}, ())
     if library is not None:
-        campaign = known_soils(library, (part.soil for part in gathered.pairs))
+        named = {part.soil for part in gathered.pairs}
+        named |= {
+            section.soil for ground in grounds for section in ground.sections if section.soil in library
+        }
+        campaign = known_soils(library, named or library)
+        if campaign.soils and _UNLABELLED in read.missing:
+            read.missing.remove(_UNLABELLED)
     elif gathered.pairs:
         campaign = gathered.learn()
     step(total - 1)
@@ -212,7 +221,7 @@ def _lacks(run: Run) -> list[str]:
     if not run.has_adhesion:
         found.append("no drive torque was logged, so there is no adhesion, curve or efficiency")
     if not run.soils and run.has_adhesion:
-        found.append("no soil label, so no curve can be learned (a column soil)")
+        found.append(_UNLABELLED)
     if not {"latitude", "longitude"} <= columns:
         found.append("no position, so there is no map")
     if run.began is None:

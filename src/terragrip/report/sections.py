@@ -63,8 +63,9 @@ def tracking(run: Run, prose: Sequence[str] = ()) -> Section:
         f"The same from {between}, around {about}.",
         f"Traction of wheel {wheel} in {run.name}, zoomed to {between}",
     )
+    is_shorter = end - start < float(run.time[-1] - run.time[0])
     scored = sensor_table(run)
-    shown = (whole, near) if scored is None else (whole, near, scored)
+    shown = (whole, *((near,) if is_shorter else ()), *((scored,) if scored is not None else ()))
     return Section(f"tracking-{run.name}", f"Traction in {run.name}", tuple(prose), shown)
 
 
