@@ -12,6 +12,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.formats import Profile, read
+from terragrip.formats.table import LogTable
 from terragrip.recording import Recording, sensor_noise
 
 PROFILE = """\
@@ -481,3 +482,10 @@ def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None
         InputError, match=r"column time: is missing; name it in the profile: 'time: \{from: \.\.\.\}'"
     ):
         profile.apply(foreign)
+
+
+def test_a_profile_that_reads_nothing_of_a_log_of_signals_is_refused() -> None:
+    """A KeyError before, on what `inspect` proposes for MATLAB tables without a time."""
+    log = LogTable(("time", "Data.Weight"), {}, source="log.mat", clocked=True)
+    with pytest.raises(InputError, match="the profile reads none of its signals"):
+        Profile.from_dict({"channels": {}}).apply(log)

@@ -9,13 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.formats.candidates import Column, candidates_of
-from terragrip.formats.evidence import (
-    RATE_UNITS,
-    Evidence,
-    Finding,
-    Series,
-    nearest_unit,
-)
+from terragrip.formats.evidence import Evidence, Finding, Series, nearest_unit, sizes
 from terragrip.formats.judgement import E7, Guess
 from terragrip.formats.rims import Ranked, Rims, Way, surest
 from terragrip.recording.checks import PLACES
@@ -90,28 +84,16 @@ class Agreement:
             factor = factor_to(north.unit, "deg")
             if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
                 result.append((f"{pair[0]}, {pair[1]}", path))
-        for name, column in self._columns.items():
-            if (
-                column.kind == "length"
-                and column.name.axis == "x"
-                and not column.name.has("odometry", "statistic", "other")
-            ):
-                other = next(
-                    (
-                        n
-                        for n, c in self._columns.items()
-                        if c.kind == "length"
-                        and c.name.axis == "y"
-                        and c.name.concepts == column.name.concepts
-                    ),
-                    None,
-                )
-                if other is not None and column.unit is not None:
-                    path = self._evidence.displacements(
-                        (name, other), degrees=False, unit=factor_to(column.unit, "m")
-                    )
-                    if path is not None:
-                        result.append((f"{name}, {other}", path))
+        places = {n: c for n, c in self._columns.items() if c.kind == "length" and c.unit is not None}
+        for name, column in places.items():
+            if column.name.axis != "x" or column.name.has("odometry", "statistic", "other"):
+                continue
+            alike = (n for n, c in places.items() if c.name.concepts == column.name.concepts)
+            other = next((n for n in alike if places[n].name.axis == "y"), None)
+            if other is not None:
+                metres = factor_to(str(column.unit), "m")
+                path = self._evidence.displacements((name, other), degrees=False, unit=metres)
+                result += [] if path is None else [(f"{name}, {other}", path)]
         for name, column in self._columns.items():
             if (
                 column.name.has("distance")
@@ -128,29 +110,21 @@ class Agreement:
                 finding = self._evidence.against_distance(name, source, path)
             else:
                 finding = self._evidence.against_path(name, path, source)
-            if finding is not None:
-                if not finding.agrees and guess.channel == "wheel_based_speed":
-                    continue
-                judged = guess.with_finding(finding)
-                read = guess.column.name
-                if (
-                    guess.channel == "ground_speed"
-                    and read.has("body")
-                    and not read.has("ground")
-                    and not judged.doubt
-                ):
-                    judged = replace(judged, doubt="a vehicle's speed may be computed from its wheels")
-                return judged if finding.agrees else replace(judged, confidence=0.3 * guess.confidence)
+            if finding is None or (not finding.agrees and guess.channel == "wheel_based_speed"):
+                continue
+            judged, read = guess.with_finding(finding), guess.column.name
+            of_the_body = read.has("body") and not read.has("ground")
+            if guess.channel == "ground_speed" and of_the_body and not judged.doubt:
+                judged = replace(judged, doubt="a vehicle's speed may be computed from its wheels")
+            return judged if finding.agrees else replace(judged, confidence=0.3 * guess.confidence)
         return guess
 
     def _prefer_ground(self, ranked: Ranked) -> None:
         """Of two speeds of which one is named as over ground, the other is more likely the vehicle's own."""
         named = [g for g in ranked["ground_speed"] if g.column.name.has("ground") or g.why.startswith(_KNOWN)]
         if not named:
-            beside = {g.column.column for g in ranked["latitude"]} if ranked.get("latitude") else set()
-            prefixes = {
-                self._columns[c].name.words[:1] for c in beside if len(self._columns[c].name.words) > 1
-            }
+            beside = [g.column.name.words for g in ranked.get("latitude", ())]
+            prefixes = {words[:1] for words in beside if len(words) > 1}
             ranked["ground_speed"] = [
                 replace(
                     g, confidence=max(g.confidence, 0.75), evidence=(*g.evidence, "named like the latitude")
@@ -225,11 +199,8 @@ class Agreement:
             result = self._evidence.fit(guess.column.column, *rate)
             if result is not None and result[1] > 0.6:
                 unit = nearest_unit(result[0], {"m/s^2": 1.0, "g": 1 / 9.80665}, 0.35)
-                plain = guess.column.unit is not None or guess.unit == unit
                 sentence = f"varies with the derivative of {ground[0]} (correlation {result[1]:.2f})"
-                guess = guess.with_finding(
-                    Finding(True, sentence, unit if not plain or guess.column.unit is None else None)
-                )
+                guess = guess.with_finding(Finding(True, sentence, None if guess.column.unit else unit))
             judged.append(guess)
         ranked["acceleration_x"] = judged
 
@@ -245,17 +216,13 @@ class Agreement:
                 result = self._evidence.fit(guess.column.column, *rate)
                 if result is None or abs(result[1]) < 0.8:
                     continue
-                unit = nearest_unit(abs(result[0]), RATE_UNITS, 0.3)
+                unit = nearest_unit(abs(result[0]), sizes("rad/s", "rad/s", "deg/s"), 0.3)
                 if unit is None:
                     continue
                 sentence = f"varies with the rate of turn by {source} (correlation {result[1]:.2f})"
-                judged_once = guess.with_finding(Finding(True, sentence, unit))
-                guess = replace(
-                    judged_once,
-                    confidence=max(judged_once.confidence, 0.75)
-                    if guess.confidence < 0.5
-                    else judged_once.confidence,
-                )
+                least = 0.75 if guess.confidence < 0.5 else 0.0
+                guess = guess.with_finding(Finding(True, sentence, unit))
+                guess = replace(guess, confidence=max(guess.confidence, least))
                 break
             else:
                 guess = guess.with_finding(self._at_speed(guess, self._ground(ranked)))

@@ -53,6 +53,9 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     if time.column not in log.columns:
         if not log.clocked:
             raise _missing(time.column, log)
+        if TIME not in log.columns:
+            hint = "name some under 'channels:' ('terragrip inspect' shows them)"
+            raise InputError("the profile reads none of its signals", file=log.source, hint=hint)
         time = time.model_copy(update={"column": TIME, "unit": "s"})
     elif (stated := log.units.get(time.column)) is not None and stated != time.unit:
         time, remarks = _in_its_unit(time, stated)

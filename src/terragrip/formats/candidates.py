@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 from terragrip.formats.profile import Profile
 from terragrip.formats.vocabulary import Name, Vocabulary
@@ -19,9 +20,15 @@ _KINDS = {
 }  # fmt: skip
 _MISSPELT = re.compile(r"ms(\^?-?2|²|\^?-1|⁻[¹²])")  # m/s^2 or m/s, which read as powers of milliseconds
 ON_THE_BUS = "a signal of J1939, ISO 11783 or NMEA 2000"
-_ROS = re.compile(
-    r"\.(twist|linear|angular|angular_velocity|linear_acceleration|velocity|effort|wrench)(\.|\d|$)"
+_ROS = (
+    (r"\.linear_acceleration\.[xyz]$", "m/s^2"),
+    (r"\.(angular_velocity|angular)\.[xyz]$", "rad/s"),
+    (r"\.wrench\.force\.[xyz]$", "N"),
+    (r"\.twist\.linear\.[xyz]$", "m/s"),
+    (r"\.velocity(\d|\.)|joint.*\.velocity$", "rad/s"),
+    (r"\.effort(\d|\.)|joint.*\.effort$", "N m"),
 )
+"""Fields of ROS's own message types, by the end of their path, and their units (REP 103)."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +46,10 @@ class Column:
     one_of_several: bool = False
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A column that may be a channel: ``score`` (0 to 1) and ``why`` by the name."""
+class Candidate(NamedTuple):
+    """A channel that a column may be: ``score`` (0 to 1) and ``why`` by the name."""
 
     channel: str
-    column: str
     score: float
     why: str
 
@@ -53,8 +58,7 @@ _WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "ic
 """Odometry by these does not look at the wheels; the profile ros2-4wd takes it for ground speed, too."""
 _SLOPES = frozenset({"slope", "incline", "inclination", "steigung", "pente", "pendiente", "pendenza"})
 _FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
-Hint = tuple[str, float, str]
-"""What a name says of a column that may be a channel: the channel, the score, and why."""
+Hint = tuple[str, float, str]  # a Candidate's
 
 
 def columns_of(
@@ -125,7 +129,7 @@ def candidates_of(column: Column) -> list[Candidate]:
     # A wheel may have any name, but none that ends in a unit or says what is no measurement.
     any_name = split_channel(own) is not None and own not in CHANNELS
     if is_channel(own) and not (any_name and (column.name.unit or column.name.has("command", "statistic"))):
-        return [Candidate(own, own, 1.0, "Terragrip's own name")]
+        return [Candidate(own, 1.0, "Terragrip's own name")]
     last = re.split(r"[./]", own)[-1]  # of a struct or a message
     if (
         last != own
@@ -133,17 +137,16 @@ def candidates_of(column: Column) -> list[Candidate]:
         and is_channel(last)
         and not column.name.has("command", "statistic", "odometry")
     ):
-        return [Candidate(last, own, 1.0, "Terragrip's own name")]
+        return [Candidate(last, 1.0, "Terragrip's own name")]
     standard = _on_the_bus().get(last)
     if standard is not None:
-        return [Candidate(standard, own, 0.95, ON_THE_BUS)]
+        return [Candidate(standard, 0.95, ON_THE_BUS)]
     if column.name.has("command", "statistic", "change", "other"):
         return []
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
         result = ways(column)
         if result:
-            fitting = (hint for hint in result if column.kind is None or _fits(column.kind, hint[0]))
-            return [Candidate(channel, own, score, why) for channel, score, why in fitting]
+            return [Candidate(*hint) for hint in result if column.kind is None or _fits(column.kind, hint[0])]
     return []
 
 
@@ -357,20 +360,8 @@ def _in_turns(unit: str | None) -> bool:
 
 
 def _unit_of_ros(column: str) -> str | None:
-    """The unit of a field of ROS's own message types (REP 103: SI), by the path of the field, with points or strokes."""
+    """The unit of a field of ROS's own message types, by its path with points or strokes."""
     column = re.sub(r"\[(\d+)\]", r"\1", column.replace("/", "."))
-    match = _ROS.search(column)
-    if match is None or "covariance" in column:
+    if "covariance" in column:
         return None
-    if re.search(r"linear_acceleration\.[xyz]$", column):
-        return "m/s^2"
-    if re.search(r"(angular_velocity|angular)\.[xyz]$", column):
-        return "rad/s"
-    if re.search(r"wrench\.force\.[xyz]$", column):
-        return "N"
-    if re.search(r"twist\.linear\.[xyz]$", column):
-        return "m/s"
-    end = r"(\d|\.|$)" if "joint" in column else r"(\d|\.)"
-    if re.search(rf"(^|\.)velocity{end}", column):
-        return "rad/s"
-    return "N m" if re.search(rf"(^|\.)effort{end}", column) else None
+    return next((unit for field, unit in _ROS if re.search(field, column)), None)

@@ -260,9 +260,7 @@ def _refuse_apart(name: str, origin: Source, dividend: Floats, divisor: Floats, 
 def _factor(name: str, origin: Source, log: LogTable) -> float:
     """Factor to the schema's unit: from the profile's unit, else from the one that the log itself states."""
     target = unit_of(name)
-    if target is None:
-        return 1.0
-    if origin.is_geographic:
+    if target is None or origin.is_geographic:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
@@ -298,12 +296,11 @@ def _raw(columns: tuple[str, ...], log: LogTable, time: Floats) -> list[Floats]:
 
 def _sum(origin: Source, log: LogTable, time: Floats) -> Floats:
     """The sum (n,) of columns times their factors at the instants of the first; others of their own clock are taken between samples."""
-    (first, *others), factors = (
-        [_without_invalid(part, origin) for part in _raw(tuple(origin.sum_of or ()), log, time)],
-        (origin.sum_of or {}).values(),
-    )
-    parts = [first, *(_between(time, part) if log.clocked else part for part in others)]
-    return np.asarray(sum(factor * part for factor, part in zip(factors, parts, strict=True)))
+    factors = origin.sum_of or {}
+    parts = [_without_invalid(part, origin) for part in _raw(tuple(factors), log, time)]
+    if log.clocked:
+        parts[1:] = [_between(time, part) for part in parts[1:]]
+    return np.asarray(sum(factor * part for factor, part in zip(factors.values(), parts, strict=True)))
 
 
 def _without_invalid(values: Floats, origin: Source) -> Floats:

@@ -6,12 +6,12 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import fresh_samples, held_period, quantum
+from terragrip.recording.noise import MAD_TO_SD
 
 _FEWEST = 4  # points for a parabola with one to spare
 _ROUNDS = 3  # of reweighting, after which outlying positions no longer move
 _WIDEST = 100  # samples to either side of a window
 _BLOCK = 20_000  # instants at once, to bound memory
-_MAD_TO_SD = 1.482602218505602  # of a normal distribution
 
 
 def fresh_positions(time: Floats, positions: list[Floats]) -> Bools:
@@ -102,7 +102,7 @@ def _parabolas(
             break
         # Three parameters were fitted to each window, which shrinks its residuals.
         shrink = np.sqrt(max(1.0 - 3.0 / float(np.median(inside[enough].sum(axis=1))), 0.2))
-        scale = max(_MAD_TO_SD * float(np.median(kept)) / shrink, floor)
+        scale = max(MAD_TO_SD * float(np.median(kept)) / shrink, floor)
         if scale == 0.0:
             break
         weight = inside * np.clip(1.0 - (residual / (6.0 * scale)) ** 2, 0.0, None) ** 2

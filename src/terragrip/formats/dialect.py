@@ -72,16 +72,16 @@ def detect(data: bytes, source: str) -> Dialect:
             hint="put a header row above the numbers",
         )
     rows = 1
-    units: dict[str, str] = {}
     third = split(lines[2], separator) if len(lines) > 2 else []
     if len(lines) > 2 and _is_units_row(second, third, decimal):
-        rows, units = 2, dict(zip(header, (_bare(cell) for cell in second), strict=False))
+        rows = 2
     elif (
         len(lines) > 3  # three rows of header: names, units, short names
         and not any(_is_number(cell, decimal) for cell in third)
         and _is_units_row(second, split(lines[3], separator), decimal)
     ):
-        rows, units = 3, dict(zip(header, (_bare(cell) for cell in second), strict=False))
+        rows = 3
+    units = dict(zip(header, map(_bare, second), strict=False)) if rows > 1 else {}
     if len(second) == len(header) + 1 and not second[-1]:
         header.append("")
     names, notes = _names_and_units(header)

@@ -13,7 +13,7 @@ import numpy as np
 
 from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
-from terragrip.units import STANDARD_GRAVITY
+from terragrip.units import STANDARD_GRAVITY, factor_to
 
 Series = tuple[Floats, Floats]
 Path = tuple[Floats, Floats, Floats]
@@ -24,16 +24,7 @@ _SLOWEST = 0.3  # m/s
 _ALIKE = 0.5
 """Least correlation of two columns' sizes, or share of their product that has one sign, by which they go together."""
 _WINDOW = 2.0  # s over which a path is taken for straight
-SPEED_UNITS = {
-    "m/s": 1.0,
-    "km/h": 3.6,
-    "mph": 2.23694,
-    "knots": 1.94384,
-    "cm/s": 100.0,
-    "mm/s": 1000.0,
-    "ft/s": 3.28084,
-}
-RATE_UNITS = {"rad/s": 1.0, "deg/s": 57.29578}
+_SPEED_UNITS = ("m/s", "km/h", "mph", "knots", "cm/s", "mm/s", "ft/s")
 _ACCELERATION_UNITS = {"m/s^2": STANDARD_GRAVITY, "g": 1.0, "mg": 1000.0, "cm/s^2": 100 * STANDARD_GRAVITY}
 RADII = (0.03, 1.3)  # m, of wheels that drive on ground
 
@@ -45,6 +36,11 @@ class Finding:
     agrees: bool
     sentence: str
     unit: str | None = None
+
+
+def sizes(base: str, *units: str) -> dict[str, float]:
+    """How many of each unit make one ``base``."""
+    return {unit: factor_to(base, unit) for unit in units}
 
 
 def nearest_unit(ratio: float, units: Mapping[str, float], tolerance: float) -> str | None:
@@ -147,17 +143,6 @@ class Evidence:
         begins, ends = _windows(time)
         return time[begins], time[ends], np.hypot(north[ends] - north[begins], east[ends] - east[begins])
 
-    def run_over(self, name: str, path: Path) -> tuple[float, float] | None:
-        """The integral of a column's size over a path's pieces, divided by their length, and that length [m]; None of short paths."""
-        pieces = self.pieces_over(name, path)
-        if pieces is None:
-            return None
-        run, lengths, durations = (float(one.sum()) for one in pieces)
-        # Of a receiver that stands still, the path is its noise.
-        if lengths < max(2.0, _SLOWEST * durations) or not run > 0:
-            return None
-        return run / lengths, lengths
-
     def pieces_over(self, name: str, path: Path) -> tuple[Floats, Floats, Floats] | None:
         """Of a path's pieces within a column's time the integrals of its size, their lengths [m] and how long they last [s]; else None."""
         result = self.series(name)
@@ -172,13 +157,17 @@ class Evidence:
 
     def against_path(self, name: str, path: Path, source: str) -> Finding | None:
         """A speed column against a path: its integral over the pieces divided by their lengths tells the unit."""
-        result = self.run_over(name, path)
-        if result is None:
+        pieces = self.pieces_over(name, path)
+        if pieces is None:
             return None
-        ratio, driven = result
+        run, driven, lasted = (float(one.sum()) for one in pieces)
+        # Of a receiver that stands still, the path is its noise.
+        if driven < max(2.0, _SLOWEST * lasted) or not run > 0:
+            return None
+        ratio = run / driven
         # A short way does not tell miles from kilometres.
-        likely = SPEED_UNITS if driven > 50 else {unit: SPEED_UNITS[unit] for unit in ("m/s", "km/h", "mm/s")}
-        unit = nearest_unit(ratio, likely, 0.12 if driven > 50 else 0.3)
+        likely = _SPEED_UNITS if driven > 50 else ("m/s", "km/h", "mm/s")
+        unit = nearest_unit(ratio, sizes("m/s", *likely), 0.12 if driven > 50 else 0.3)
         if unit is None:
             return Finding(False, f"its integral is {ratio:.3g} times the path of {source}")
         return Finding(True, f"its integral is the path of {source}, in {unit}", unit)

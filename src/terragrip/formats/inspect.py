@@ -12,9 +12,8 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
-from terragrip.formats.fitting import Fit, fit_of
 from terragrip.formats.profile import Profile
-from terragrip.formats.proposal import is_ready, missing_channels, profile_text, refusal
+from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, profile_text, refusal
 from terragrip.formats.reading import read_log, recording_of
 from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog

@@ -81,10 +81,9 @@ class Judge:
             for n, c in columns.items()
         )
 
-    def of(self, candidate: Candidate) -> Guess | None:
-        """The candidate with its unit, judged by its own values; None where they rule it out."""
-        column = self._columns[candidate.column]
-        values = self._numbers[candidate.column]
+    def of(self, column: Column, candidate: Candidate) -> Guess | None:
+        """A column as a candidate says, with its unit, judged by its own values; None where they rule it out."""
+        values = self._numbers[column.column]
         known = values[np.isfinite(values)]
         own = candidate.score == 1.0
         may_be_constant = own or candidate.channel in _CONSTANTS
@@ -103,7 +102,7 @@ class Judge:
             surer = candidate.score if own else 1 - 0.7 * (1 - candidate.score)  # it measures the same
             guess = replace(guess, confidence=surer, evidence=(candidate.why, f"in {column.unit}"))
         elif target is not None and (
-            not own or (target == "rad" and (self._in_degrees or self._evidence.size(candidate.column) > 1.6))
+            not own or (target == "rad" and (self._in_degrees or self._evidence.size(column.column) > 1.6))
         ):
             guess = self._sized(guess, target)
         elif own:
@@ -114,11 +113,11 @@ class Judge:
             target is not None
             and column.unit is not None
             and not own
-            and _too_large(guess, self._evidence.size(candidate.column), target)
+            and _too_large(guess, self._evidence.size(column.column), target)
         ):
             return None
         if candidate.channel in ("pitch", "roll") and guess.unit is not None:
-            size = self._evidence.size(candidate.column) * factor_to(guess.unit, "rad")
+            size = self._evidence.size(column.column) * factor_to(guess.unit, "rad")
             if size > _STEEP:
                 guess = replace(
                     guess,

@@ -28,15 +28,15 @@ import fnmatch
 import os
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError, suggestion
 from terragrip.formats.conversion import convert
 from terragrip.formats.payload import Payload
-from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, rate_unit
+from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, one_or_several, rate_unit
 from terragrip.recording import Recording
 from terragrip.recording.schema import (
     AXLE_CHANNELS,
@@ -63,7 +63,7 @@ class Profile(Part):
     time: TimeSource = Field(default_factory=lambda: TimeSource.model_validate({}))
     rows: Rows | None = None
     payload: Payload | None = None  # of a live source's messages
-    dbc: tuple[str, ...] = ()
+    dbc: Annotated[tuple[str, ...], BeforeValidator(one_or_several)] = ()
     channels: dict[str, Source]
 
     @classmethod
@@ -91,11 +91,6 @@ class Profile(Part):
     def to_dict(self) -> dict[str, Any]:
         """The profile as `from_dict` accepts it, ready for JSON."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
-
-    @field_validator("dbc", mode="before")
-    @classmethod
-    def _one_or_several(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
 
     @field_validator("channels", mode="before")
     @classmethod

@@ -16,7 +16,7 @@ from terragrip.units import UnitError, factor_to, quantity
 Seconds = Annotated[float, BeforeValidator(lambda value: quantity(value, "s"))]
 
 
-def _one_or_several(value: object) -> object:
+def one_or_several(value: object) -> object:
     """``derivative_of: ticks`` is short for ``derivative_of: [ticks]``."""
     return (value,) if isinstance(value, str) else value
 
@@ -54,7 +54,7 @@ class Source(Part):
     over: str | None = None
     over_minimum: float = Field(0.0, ge=0.0, allow_inf_nan=False)
     derivative_of: (
-        Annotated[tuple[str, ...], BeforeValidator(_one_or_several), Field(min_length=1, max_length=3)] | None
+        Annotated[tuple[str, ...], BeforeValidator(one_or_several), Field(min_length=1, max_length=3)] | None
     ) = None
     norm_of: Annotated[tuple[str, ...], Field(min_length=2, max_length=3)] | None = None
     sum_of: (

@@ -105,7 +105,7 @@ def propose(
         for candidate in () if is_of_an_axle(column) else candidates_of(column):
             if column.column in plane and candidate.channel == "ground_speed":
                 continue
-            if (guess := judge.of(candidate)) is not None:
+            if (guess := judge.of(column, candidate)) is not None:
                 ranked.setdefault(candidate.channel, []).append(guess)
     Agreement(columns, evidence, vehicle).refine(ranked)
     chosen = _assigned(ranked)

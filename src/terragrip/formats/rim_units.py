@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from terragrip.arrays import Floats
-from terragrip.formats.evidence import Evidence, Path
+from terragrip.formats.evidence import Evidence, Finding, Path
 from terragrip.formats.judgement import Guess
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.units import factor_to
@@ -74,24 +74,14 @@ class RimUnit:
     def judge(self, guess: Guess, radius: float) -> Guess:
         """The guess with this unit: surer where no other is possible, with a question mark where one is."""
         if guess.column.column == guess.channel and "rad/s" in self.possible:  # by our own name it is rad/s
-            return RimUnit(self.ground, {"rad/s": self.possible["rad/s"]})._agreeing(guess, radius)
+            own = RimUnit(self.ground, {"rad/s": self.possible["rad/s"]})
+            return guess.with_finding(Finding(True, own.sentence(radius), "rad/s"))
         sentence = self.sentence(radius)
-        if self.unit is None:
-            return replace(guess, confidence=0.5 * guess.confidence, doubt=sentence)
-        if not self.is_sure:
+        if self.possible and not self.is_sure:
             return replace(
                 guess, confidence=0.7 * guess.confidence, unit=self.unit, unit_doubt=f"{sentence}?"
             )
-        return self._agreeing(guess, radius)
-
-    def _agreeing(self, guess: Guess, radius: float) -> Guess:
-        return replace(
-            guess,
-            confidence=1 - 0.45 * (1 - guess.confidence),
-            unit=self.unit,
-            evidence=(*guess.evidence, self.sentence(radius)),
-            unit_doubt="",
-        )
+        return guess.with_finding(Finding(self.unit is not None, sentence, self.unit))
 
 
 def own_name(vehicle: Vehicle | None, wheel: str, vocabulary: Vocabulary = GENERAL) -> str:

@@ -8,16 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.formats.candidates import kind_of
-from terragrip.formats.evidence import (
-    RADII,
-    SPEED_UNITS,
-    Evidence,
-    Finding,
-    Path,
-    Series,
-    nearest_unit,
-    slope_of,
-)
+from terragrip.formats.evidence import RADII, Evidence, Finding, Path, Series, nearest_unit, sizes, slope_of
 from terragrip.formats.judgement import Guess
 from terragrip.formats.rim_units import POSSIBLE, lightest_share, radius_of, rim_unit, speeds_of
 from terragrip.units import factor_to
@@ -92,32 +83,12 @@ class Rims:
         }
 
     def _against_way(self, guess: Guess, ground: Ground | None, paths: list[Way]) -> Guess:
-        result = None
-        if guess.column.unit is None and not guess.column.name.has("motor"):
-            result = self._metres(guess.column.column, ground, paths)
-        elif (
-            ground is not None and (ratio := self._evidence.ratio(ground[0], guess.column.column)) is not None
-        ):
-            result = ratio[0] * ground[1], ground[0]
-        elif ground is None:
-            result = self._by_path(guess, paths)
-        return guess if result is None else guess.with_finding(self._rim(guess, *result))
-
-    def _metres(self, column: str, ground: Ground | None, paths: list[Way]) -> tuple[float, str] | None:
-        """Metres of ground for one count of wheel speed over a second, and by what; None where the two do not go together."""
-        pair = speeds_of(self._evidence, [column], ground, paths)
-        share = None if pair is None else lightest_share(pair[1], pair[2][0])
-        return None if pair is None or share is None else (share, pair[0])
-
-    def _by_path(self, guess: Guess, paths: list[Way]) -> tuple[float, str] | None:
-        """Metres driven for one count of wheel speed over a second, by positions."""
-        for source, path in paths:
-            if (
-                not isinstance(path, float)
-                and (run := self._evidence.run_over(guess.column.column, path)) is not None
-            ):
-                return 1 / run[0], source
-        return None
+        """The guess by the metres of ground for one count of wheel speed over a second; as it is where the two do not go together."""
+        pair = speeds_of(self._evidence, [guess.column.column], ground, paths)
+        metres = None if pair is None else lightest_share(pair[1], pair[2][0])
+        return (
+            guess if pair is None or metres is None else guess.with_finding(self._rim(guess, metres, pair[0]))
+        )
 
     def _rim(self, guess: Guess, metres: float, ground: str) -> Finding | None:
         """``metres``: of ground speed for one count of wheel speed, by what is called ``ground``."""
@@ -153,9 +124,8 @@ class Rims:
             radius = metres / factor_to(unit, "rad/s")
             if RADII[0] <= radius <= RADII[1]:
                 likely[unit] = f"a radius of {radius:.3g} m follows from {ground}"
-        likely |= {
-            u: f"as {ground} in {u}" for u in ("m/s", "km/h") if abs(np.log(metres * SPEED_UNITS[u])) < 0.12
-        }
+        if near := nearest_unit(1 / metres, sizes("m/s", "m/s", "km/h"), 0.12):
+            likely[near] = f"as {ground} in {near}"
         if len(likely) == 1:
             unit, notes = next(iter(likely.items()))
             return Finding(True, notes, unit)
@@ -215,9 +185,7 @@ class Rims:
         if guess.unit is not None and guess.column.unit is not None:
             share = result[0] * factor / factor_to(guess.unit, "m/s")
             return Finding(0.5 < share < 1.6, f"{ground} is {share:.3g} times as fast")
-        unit = nearest_unit(
-            1 / (result[0] * factor), {k: SPEED_UNITS[k] for k in ("m/s", "km/h", "mm/s")}, 0.4
-        )
+        unit = nearest_unit(1 / (result[0] * factor), sizes("m/s", "m/s", "km/h", "mm/s"), 0.4)
         return Finding(
             unit is not None,
             f"as fast as {ground}" if unit else f"is not as fast as {ground} in any unit",

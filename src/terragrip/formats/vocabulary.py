@@ -307,20 +307,7 @@ def words_of(name: str) -> list[str]:
     result: list[str] = []
     plain = _ELISION.sub("", _without_accents(name))
     for part in re.split(r"[^A-Za-z0-9]+", _ordinals(plain)):
-        if part.lower() in (
-            "nm",
-            "kn",
-            "knm",
-            "knots",
-            "kmph",
-            "kmh",
-            "kph",
-            "mph",
-            "mps",
-            "rpm",
-            "ms2",
-            "mps2",
-        ):
+        if part.lower() in (*_ALWAYS, "nm", "kn", "knm", "knots", "ms2", "mps2"):
             result.append(part.lower())
             continue
         # A plural abbreviation in capitals beside a word (WheelSpFL) comes apart by case alone.
