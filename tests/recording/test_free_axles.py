@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.free_axles import free_axle_warnings
+from terragrip.recording.axles import free_axle_warnings
 from terragrip.simulation import families
 from terragrip.vehicle import Vehicle
 

@@ -1,13 +1,15 @@
-"""Speeds, accelerations and forces that keep one value are named; what is held between samples, or stands, is left alone."""
+"""Channels that keep one value, or end at one, are named; what is held between samples, stands, or is at a motor's limit is left alone."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pytest
 
 from steady_drive import RATE, TIME, log, pulling
-from terragrip.recording import Recording
-from terragrip.recording.frozen import frozen_warnings
+from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.frozen import cut_warnings, frozen_warnings
 
 
 def repeated(name: str, start: float, end: float, value: float | None = None) -> Recording:
@@ -216,3 +218,31 @@ def test_a_torque_in_coarse_steps_keeps_its_value_by_them() -> None:
     calm = np.where(abs(TIME - 100) < 20, 110.0, 100 + 40 * np.sin(TIME / 3))
     noisy = calm + np.random.default_rng(3).standard_normal(len(TIME))
     assert frozen_warnings(pulling(drive_torque_l=np.round(noisy / 12) * 12)) == []
+
+
+def test_the_ends_of_a_drive_with_noise_or_steps_say_nothing() -> None:
+    assert cut_warnings(pulling()) == []
+    coarse = {name: np.round(values) for name, values in pulling().channels.items() if "torque" in name}
+    assert cut_warnings(pulling(**coarse)) == [], "a channel of whole N m"
+
+
+@pytest.mark.parametrize("name", ["drive_torque_l", "drawbar_force", "acceleration_x"])
+def test_a_channel_that_its_range_cuts_is_named(name: str) -> None:
+    """All three read on without a word before."""
+    values = pulling().channels[name]
+    most = float(np.quantile(values, 0.9))
+    cut = pulling(**{name: np.minimum(values, most)})
+    (note,) = cut_warnings(cut)
+    assert re.match(rf"{name} is {most:.4g} in (9|1[0-3])% of the driving", note)
+    assert "never more" in note
+    assert note in unit_warnings(cut, None)
+    (note,) = cut_warnings(pulling(**{name: -np.minimum(values, most)}))
+    assert "never less" in note
+
+
+def test_a_motor_at_its_limit_and_a_slack_bar_are_left_alone() -> None:
+    """Both stay at one value for long: the noise of a force that is cut comes and goes."""
+    torque = np.where((TIME > 20) & (TIME < 60), 150.0, pulling().channels["drive_torque_l"])
+    pull = np.where(TIME < 90, 0.0, pulling().channels["drawbar_force"])
+    assert cut_warnings(pulling(drive_torque_l=torque, drawbar_force=pull)) == []
+    assert cut_warnings(log()) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -194,9 +195,9 @@ def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
     means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     log = torques()
     thrusts = dict.fromkeys(WHEELS, thrust * X / 4)
-    notes = _balance_warnings(log, means, forward * X, thrusts, vehicle)
+    notes = _balance_warnings(log, replace(means, thrusts=thrusts), forward * X, vehicle)
     assert " ".join(notes) == "" if not words else words in " ".join(notes)
-    alone = _balance_warnings(log, means, forward * X, {}, vehicle)
+    alone = _balance_warnings(log, means, forward * X, vehicle)
     assert ("but its opposite: forward is positive" in " ".join(alone)) is (forward < 0)
 
 
@@ -209,7 +210,7 @@ def test_an_accelerometer_alone_is_backward_from_three_errors_below_none(
             return Fit(slope, 0.1, -0.5)
 
     means = Fits(np.arange(3), 3, np.ones(3, dtype=bool), np.zeros(3), np.ones(3), None)
-    notes = _balance_warnings(Recording(np.arange(3.0), {}), means, np.zeros(3), {}, None)
+    notes = _balance_warnings(Recording(np.arange(3.0), {}), means, np.zeros(3), None)
     assert [note.startswith("acceleration_x is not the change") for note in notes] == [True] * opposite
 
 
@@ -221,7 +222,7 @@ def test_wheels_that_drive_against_the_others_are_named(
 ) -> None:
     means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     thrusts = {w: (-1 if w in turned else 1) * X / 4 for w in WHEELS}
-    notes = " ".join(_balance_warnings(torques(turned), means, X, thrusts, vehicle))
+    notes = " ".join(_balance_warnings(torques(turned), replace(means, thrusts=thrusts), X, vehicle))
     assert notes == "" if not words else words in notes
 
 
@@ -229,7 +230,7 @@ def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
     means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))
     sideways = np.random.default_rng(1).normal(size=80)
-    (note,) = _balance_warnings(log, means, sideways, dict.fromkeys(WHEELS, X / 4), vehicle)
+    (note,) = _balance_warnings(log, replace(means, thrusts=dict.fromkeys(WHEELS, X / 4)), sideways, vehicle)
     assert note.startswith("acceleration_y varies with the drive torques")
 
 
@@ -325,11 +326,11 @@ def test_without_motion_or_vehicle_nothing_is_said(vehicle: Vehicle) -> None:
     time = np.arange(0.0, 60.0, 0.5)
     for speed in (np.zeros(120), np.ones(120)):
         log = Recording(time, {"ground_speed": speed})
-        assert motion_warnings(log, vehicle, means_of(log), {}) == []
+        assert motion_warnings(log, vehicle, means_of(log)) == []
     change = np.sin(time / 3)
     speed = 10.0 + np.cumsum(change) * 0.5
     log = Recording(time, {"ground_speed": speed, "acceleration_x": -change})
-    notes = motion_warnings(log, None, means_of(log), {})
+    notes = motion_warnings(log, None, means_of(log))
     assert notes == [
         "acceleration_x is not the change of ground speed but its opposite: forward is positive: write 'sign: -1' for it in the profile."
     ]
@@ -345,6 +346,8 @@ def test_without_an_accelerometer_change_of_speed_and_climb_tell(
     for grade in (None, climb):
         means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), grade)
         force = X + (0.0 if grade is None else grade)
-        notes = " ".join(_thrust_warnings(means, dict.fromkeys(WHEELS, scale * force / 4), vehicle))
+        notes = " ".join(
+            _thrust_warnings(replace(means, thrusts=dict.fromkeys(WHEELS, scale * force / 4)), vehicle)
+        )
         assert notes == "" if not words else words in notes
-    assert _thrust_warnings(means, {}, vehicle) == []
+    assert _thrust_warnings(means, vehicle) == []

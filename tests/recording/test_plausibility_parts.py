@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.position_speed import _straight_ahead
-from terragrip.recording.speed_ratios import _pairs, ratio_of, top_speed
+from terragrip.recording.speed_ratios import _pairs, _straight_ahead, ratio_of
 from terragrip.recording.track import Track
 from terragrip.recording.turn_rates import _turn_scale, _wheel_turn
 from terragrip.recording.turns import agreement, straight_rows, windows
@@ -240,17 +239,12 @@ def test_a_ratio_is_the_median_where_both_move() -> None:
     time = np.arange(40.0)
     speed = np.where(time < 20, 2.0, 0.5)  # under three tenths of what it reaches
     other = np.where(time % 2, -3.0, 4.0)
-    assert ratio_of(time, speed, other) == pytest.approx(1.75)
-    assert ratio_of(time, other, speed) == pytest.approx((2 / 3 + 2 / 4) / 2)
-    assert ratio_of(time[:10], speed[:10], other[:10]) == pytest.approx(1.75)
-    assert ratio_of(time[:9], speed[:9], other[:9]) is None
-    assert ratio_of(time, 0 * speed, other) is None
-    assert ratio_of(time, np.full(40, np.nan), other) is None
-
-
-def test_what_a_twentieth_reaches() -> None:
-    assert top_speed(np.arange(101.0)[::-1].copy()) == 95.0
-    assert top_speed(np.array([3.0])) == 3.0
+    assert ratio_of(Recording(time, {"ground_speed": speed}), other) == pytest.approx(1.75)
+    assert ratio_of(Recording(time, {"ground_speed": other}), speed) == pytest.approx((2 / 3 + 2 / 4) / 2)
+    assert ratio_of(Recording(time[:10], {"ground_speed": speed[:10]}), other[:10]) == pytest.approx(1.75)
+    assert ratio_of(Recording(time[:9], {"ground_speed": speed[:9]}), other[:9]) is None
+    assert ratio_of(Recording(time, {"ground_speed": 0 * speed}), other) is None
+    assert ratio_of(Recording(time, {"ground_speed": np.full(40, np.nan)}), other) is None
 
 
 def test_of_a_long_log_four_thousand_pairs_are_enough() -> None:

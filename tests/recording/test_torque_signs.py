@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.torque_signs import sign_warnings
+from terragrip.recording.torques import sign_warnings
 from terragrip.vehicle import Vehicle
 
 MASS, RADIUS, G = 800.0, 0.35, 9.80665

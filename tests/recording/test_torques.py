@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.mechanics import means_of, thrusts_of
+from terragrip.recording.mechanics import means_of
 from terragrip.recording.torques import torque_warnings
 from terragrip.vehicle import Vehicle
 
@@ -50,9 +50,7 @@ def without_cell(log: Recording) -> Recording:
 
 def notes_of(log: Recording) -> list[str]:
     """What is said of a log's torques."""
-    means = means_of(log)
-    thrusts = {} if means is None else thrusts_of(log, vehicle(), means)
-    return torque_warnings(log, vehicle(), means, thrusts)
+    return torque_warnings(log, vehicle(), means_of(log, vehicle()))
 
 
 @pytest.mark.parametrize("rate", [5.0, 20.0, 100.0])

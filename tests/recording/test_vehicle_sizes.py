@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from terragrip.recording.vehicle_sizes import size_warnings
+from terragrip.recording.plain_units import size_warnings
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_maker import make
 

@@ -13,8 +13,8 @@ from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.plain_units import size_warnings
 from terragrip.recording.survey import joined
-from terragrip.recording.vehicle_sizes import size_warnings
 from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"

@@ -91,7 +91,7 @@ def settings_of(
     ``channels``: the columns of the samples. They determine whether drawbar force, mass, hitch load and the torque of an
     undriven wheel are measured. Raises InputError where the vehicle lacks a value that one of them needs.
     """
-    require_hitch(vehicle, channels)
+    require_hitch(vehicle, "hitch_load", channels)
     settings = ffi.new("tg_settings *", lib.tg_default_settings())
     settings.method = method.kind
     settings.tuning.engine = method.engine

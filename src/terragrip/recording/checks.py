@@ -144,30 +144,25 @@ def remarks(columns: Collection[str]) -> list[str]:
     return notes
 
 
-def require_hitch_height(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
-    """Raise InputError if a pull moves load between axles and the vehicle file has no height for it."""
-    if (
-        "drawbar_force" in channels
-        and len(vehicle.axles) > 1
-        and "hitch_height" not in vehicle.model_fields_set
-    ):
-        hint = "add e.g. 'hitch_height: 0.25 m' to the vehicle file"
-        problem = "the pull moves load between the axles, but the vehicle has no hitch_height"
-        raise InputError(
-            problem, file=source, place="column drawbar_force", hint=hint, page="vehicle#all-keys"
-        )
+_PLACES_OF = {
+    "drawbar_force": (
+        "hitch_height",
+        "the pull moves load between the axles, but the vehicle has no hitch_height",
+        "add e.g. 'hitch_height: 0.25 m' to the vehicle file",
+    ),
+    "hitch_load": (
+        "hitch_overhang",
+        "it moves load between the axles, but the vehicle has no hitch_overhang",
+        "add e.g. 'hitch_overhang: 1.1 m', from the last axle back to the hitch, to the vehicle file",
+    ),
+}
 
 
-def require_hitch(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> None:
-    """Raise InputError if a load on the hitch moves load between axles and the vehicle file has no place for it."""
-    if (
-        "hitch_load" in channels
-        and len(vehicle.axles) > 1
-        and "hitch_overhang" not in vehicle.model_fields_set
-    ):
-        hint = "add e.g. 'hitch_overhang: 1.1 m', from the last axle back to the hitch, to the vehicle file"
-        problem = "it moves load between the axles, but the vehicle has no hitch_overhang"
-        raise InputError(problem, file=source, place="column hitch_load", hint=hint, page="vehicle#all-keys")
+def require_hitch(vehicle: Vehicle, name: str, channels: Collection[str], source: str | None = None) -> None:
+    """Raise InputError if the force ``name`` on the hitch moves load between axles and the vehicle file does not say where it acts."""
+    key, problem, hint = _PLACES_OF[name]
+    if name in channels and len(vehicle.axles) > 1 and key not in vehicle.model_fields_set:
+        raise InputError(problem, file=source, place=f"column {name}", hint=hint, page="vehicle#all-keys")
 
 
 def refuse_other_mass(vehicle: Vehicle, channels: Mapping[str, Floats], source: str | None = None) -> None:

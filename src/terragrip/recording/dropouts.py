@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,46 +33,32 @@ def dropout_warnings(recording: Recording) -> list[str]:
     return _wheels(recording) + _ground(recording) + _torques(recording) + _blinks(recording)
 
 
-def zero_warnings(
-    recording: Recording, vehicle: Vehicle, means: Means | None, thrusts: dict[str, Floats]
-) -> list[str]:
-    """A sentence on all torques, and on a drawbar force, that are exactly 0 for long where the balance of forces shows that they were not;
-    ``thrusts``: those of `thrusts_of`."""
-    if means is None or not thrusts:
+def zero_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
+    """A sentence on all torques, and on a drawbar force, that are exactly 0 for long where the balance of forces shows they were not."""
+    if means is None or not means.thrusts:
         return []
     pull = recording.channels.get("drawbar_force")
-    left = (
-        np.sum(list(thrusts.values()), axis=0) - means.change - (0.0 if means.climb is None else means.climb)
-    )
-    found = _zeros(recording, means, left, [f"drive_torque_{wheel}" for wheel in thrusts])
+    left = means.thrust - means.change - (0.0 if means.climb is None else means.climb)
+    found = _zeros(recording, means, left, [f"drive_torque_{wheel}" for wheel in means.thrusts])
     notes = []
-    if (
-        found and -median(left[found.rows]) > PULL * STANDARD_GRAVITY
-    ):  # a vehicle that coasts is left with its resistance
-        notes.append(
-            f"{found.text} the vehicle pulls or climbs: no drive does that. Leave these cells empty."
-        )
-    found = None if pull is None else _zeros(recording, means, left, ["drawbar_force"])
-    if pull is not None and found:  # a tool that is lifted is no thrust that goes on
-        lost, drawn = median(left[found.rows]) - median(left[found.others]), means.of(pull)[found.others]
-        if lost > max(PULL * STANDARD_GRAVITY, _LOST * median(drawn) / vehicle.mass):
+    # A vehicle that coasts is left with its resistance.
+    if found and -median(left[found[0]]) > PULL * STANDARD_GRAVITY:
+        notes.append(f"{found[2]} the vehicle pulls or climbs: no drive does that. Leave these cells empty.")
+    if pull is not None and (found := _zeros(recording, means, left, ["drawbar_force"])):
+        rows, others, text = found  # a tool that is lifted is no thrust that goes on
+        lost, drawn = median(left[rows]) - median(left[others]), median(means.of(pull)[others])
+        if lost > max(PULL * STANDARD_GRAVITY, _LOST * drawn / vehicle.mass):
             notes.append(
-                f"{found.text} the wheels drive on as hard as before: not measured, it seems. Leave these cells empty."
+                f"{text} the wheels drive on as hard as before: not measured, it seems. Leave these cells empty."
             )
     return notes
 
 
-@dataclass(frozen=True)
-class _Zeros:
-    """Windows (n,) in which channels are 0 throughout, the ``others``, and the beginning of a sentence."""
-
-    rows: Bools
-    others: Bools
-    text: str
-
-
-def _zeros(recording: Recording, means: Means, left: Floats, names: list[str]) -> _Zeros | None:
-    """None where they are 0 for less than `LONG`, or else."""
+def _zeros(
+    recording: Recording, means: Means, left: Floats, names: list[str]
+) -> tuple[Bools, Bools, str] | None:
+    """Windows (n,) in which channels are 0 throughout, the others, and the beginning of a sentence; None where either last for less than
+    `LONG`."""
     columns = [recording.channels[name] for name in names]
     zero = np.logical_and.reduce([values == 0.0 for values in columns])
     stretch = longest(recording.time, zero, np.isfinite(np.sum(columns, axis=0)))
@@ -83,27 +68,26 @@ def _zeros(recording: Recording, means: Means, left: Floats, names: list[str]) -
         return None
     verb = "are" if len(names) > 1 else "is"
     text = f"{', '.join(names)} {verb} exactly 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while"
-    return _Zeros(rows, others, text)
+    return rows, others, text
+
+
+def _lost(recording: Recording, name: str, meanwhile: Bools, others: Floats) -> tuple[float, float] | None:
+    """The longest stretch in which a channel, not always 0, is 0 in rows ``meanwhile`` (n,), where it and ``others`` (n,) are known."""
+    values = recording.channels[name]
+    if is_one_value(values) or not may_last(*known_part(recording.time, values)):
+        return None
+    return longest(recording.time, (values == 0.0) & meanwhile, np.isfinite(values + others))
 
 
 def _wheels(recording: Recording) -> list[str]:
     """A sentence on wheels that read 0 for long while the ground speed goes on."""
     rims = rim_names(recording.channels)
     ground, notes = recording.channels.get("ground_speed"), []
-    if ground is None or len(rims) < 2 or not np.isfinite(ground).any():
+    if ground is None or len(rims) < 2:
         return []
-    if not any(may_last(*known_part(recording.time, recording.channels[name])) for name in rims):
-        return []
-    driving = _drives(ground)
     stretches: dict[tuple[float, float], list[str]] = {}
     for name in rims:
-        values = recording.channels[name]
-        if is_one_value(values):
-            continue
-        stretch = longest(
-            recording.time, (values == 0.0) & driving, np.isfinite(values) & np.isfinite(ground)
-        )
-        if stretch:
+        if stretch := _lost(recording, name, _drives(ground), ground):
             stretches.setdefault(stretch, []).append(name)
     for stretch, names in stretches.items():
         few = len(names) == 1
@@ -124,16 +108,10 @@ def _drives(speed: Floats) -> Bools:
 def _ground(recording: Recording) -> list[str]:
     """A sentence on a ground speed that reads 0 for long while all wheels go on."""
     rims = [recording.channels[name] for name in rim_names(recording.channels)]
-    ground = recording.channels.get("ground_speed")
-    if (
-        ground is None
-        or not rims
-        or is_one_value(ground)
-        or not may_last(*known_part(recording.time, ground))
-    ):
+    if "ground_speed" not in recording.channels or not rims:
         return []
-    rows = np.logical_and.reduce([ground == 0.0, *(_drives(rim) for rim in rims)])
-    stretch = longest(recording.time, rows, np.isfinite(np.sum([ground, *rims], axis=0)))
+    driving = np.logical_and.reduce([_drives(rim) for rim in rims])
+    stretch = _lost(recording, "ground_speed", driving, np.sum(rims, axis=0))
     if not stretch:
         return []
     return [
@@ -144,15 +122,11 @@ def _ground(recording: Recording) -> list[str]:
 
 def _torques(recording: Recording) -> list[str]:
     """A sentence on each torque that alone is 0 for long: an axle that is switched off has two of them."""
-    time, notes = recording.time, []
+    notes = []
     torques = {n: v for n, v in recording.channels.items() if n.startswith("drive_torque_")}
     for name, values in torques.items():
-        others = [other for one, other in torques.items() if one != name]
-        if not others or not may_last(*known_part(time, values)) or is_one_value(values):
-            continue
-        alone = (values == 0.0) & np.logical_and.reduce([other != 0.0 for other in others])
-        stretch = longest(time, alone, np.isfinite(values))
-        if stretch:
+        others = [other != 0.0 for one, other in torques.items() if one != name]
+        if others and (stretch := _lost(recording, name, np.logical_and.reduce(others), values)):
             notes.append(
                 f"{name} is 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while all other torques are not: its sensor lost the signal, "
                 "or its motor is off. If the sensor did, leave these cells empty."

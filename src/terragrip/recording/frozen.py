@@ -1,4 +1,8 @@
-"""Speeds and accelerations that keep one value while the vehicle's motion changes: sentences for the user, never errors."""
+"""Channels that keep one value while the vehicle's motion changes, or end at one: sentences for the user, never errors.
+
+A channel with noise hardly has one value twice as often as the next. Where its greatest or least value is its most frequent by far, a
+sensor's range ends there, and what was beyond is lost.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +29,13 @@ _OFTEN = 5  # short runs of one value,
 _SECOND, _RUN = 1.0, 10.0  # each of these seconds and times its usual repetition at least
 _RESOLVED = 0.5  # of the noise: larger steps hide it, and a sound speed keeps its value in a cruise
 _MEASURED = 4  # values that are the same
-_FINE, _NOISY = 0.02, 3e-4  # of a speed: smaller steps show its noise, and less is a simulated one's
+_FINE, _NOISY = 0.02, 3e-4  # of a channel's size: smaller steps show its noise, and less is a simulated one's
 _CHANGES = 20  # of a channel's value: fewer show no resolution
 _GAINED = 0.3  # m/s: a speed that changes by this has an acceleration
+_RANGED = ("drive_torque_", "drawbar_force", "acceleration_", "angular_velocity_")
+_SHARE, _LEAST = 0.01, 20  # of the driving, and rows, that a channel is at the end of its range
+_OFTENER = 5.0  # than any other value
+_COMES = 10  # times to this value: a channel held or switched off there comes seldom
 
 
 def frozen_warnings(recording: Recording) -> list[str]:
@@ -37,34 +45,25 @@ def frozen_warnings(recording: Recording) -> list[str]:
     ground = recording.channels.get("ground_speed")
     rims = [name for name in speeds if name != "ground_speed"]
     notes = []
-    if ground is not None and is_one_value(ground) and any(not is_one_value(speeds[name]) for name in rims):
-        value = ground[np.isfinite(ground)][0]
-        notes.append(
-            f"ground_speed ({value:.3g}) never changes while the wheels turn: the sensor is dead, or the column is wrong."
-        )
     acceleration = recording.channels.get("acceleration_x")
-    if (
-        acceleration is not None
-        and is_one_value(acceleration)
-        and any(_range(v) > _GAINED for v in _metric(speeds))
+    for name, values, others, goes_on in (
+        ("ground_speed", ground, "the wheels turn", any(not is_one_value(speeds[name]) for name in rims)),
+        ("acceleration_x", acceleration, "the speed does", any(_range(v) > _GAINED for v in _metric(speeds))),
     ):
-        value = acceleration[np.isfinite(acceleration)][0]
-        notes.append(
-            f"acceleration_x ({value:.3g}) never changes while the speed does: the sensor is dead, or the column is wrong."
-        )
-    for name in speeds:
-        others = [
-            speeds[one] for one in (["ground_speed"] if name != "ground_speed" else rims) if one in speeds
-        ]
-        notes += _repeats(name, recording.time, speeds[name], others) or _often(
-            name, recording.time, speeds[name]
-        )
+        if values is not None and goes_on and is_one_value(values):
+            value = values[np.isfinite(values)][0]
+            notes.append(
+                f"{name} ({value:.3g}) never changes while {others}: the sensor is dead, or the column is wrong."
+            )
+    for name, speed in speeds.items():
+        beside = [speeds[one] for one in (["ground_speed"] if name in rims else rims) if one in speeds]
+        notes += _repeats(name, recording.time, speed, beside) or _often(name, recording.time, speed)
     forces = {
         n: v for n, v in recording.channels.items() if n.startswith("drive_torque_") or n == "drawbar_force"
     }
-    for name, values in forces.items():
-        others = [other for one, other in forces.items() if one != name]
-        notes += _repeats(name, recording.time, values, others, forces=True)
+    for name, force in forces.items():
+        beside = [other for one, other in forces.items() if one != name]
+        notes += _repeats(name, recording.time, force, beside, forces=True)
     if acceleration is not None:
         notes += _repeats("acceleration_x", recording.time, acceleration, _metric(speeds))
     return notes + _together(recording, speeds)
@@ -206,4 +205,44 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     return [
         f"{name} keeps one value for {_SECOND:g} s or more in {rows.sum()} places at speed (first {what[first[k]]:.4g} from "
         f"{when[first[k]]:.4g} s, for {lasting[k]:.2g} s), and never by its noise: not measured, it seems. Leave these cells empty."
+    ]
+
+
+def cut_warnings(recording: Recording) -> list[str]:
+    """A sentence on each channel whose greatest or least value while driving is a limit of what it can show."""
+    ground = recording.channels.get("ground_speed")
+    if ground is None or is_one_value(ground):
+        return []
+    speed = np.abs(filled(recording.time, ground))
+    driving = speed > DRIVING * quantile(speed, 0.95)
+    return [
+        note
+        for name, values in recording.channels.items()
+        if name.startswith(_RANGED) and not is_one_value(values)
+        for note in _cut(name, recording.time, np.where(driving, values, np.nan))
+    ]
+
+
+def _cut(name: str, time: Floats, values: Floats) -> list[str]:
+    """On each end of a channel (n,), of rows of driving."""
+    when, what = known_part(time, values)
+    if len(what) < 2 * _LEAST:
+        return []
+    ends = []
+    for value, beyond in ((what.min(), "less"), (what.max(), "more")):
+        at = what == value
+        times, comes = np.count_nonzero(at), np.count_nonzero(at[1:] & ~at[:-1])
+        if times >= max(_LEAST, _SHARE * len(what)) and comes >= _COMES:
+            ends.append((float(value), beyond, times))
+    if not ends:  # of most channels that is known already
+        return []
+    counts = np.unique(what, return_counts=True)[1]
+    if len(counts) < _LEAST or not _is_restless(when, what):
+        return []
+    most = float(counts[1:-1].max())
+    return [
+        f"{name} is {value:.4g} in {times / len(what):.0%} of the driving and never {beyond}: the range of its sensor or "
+        "column ends there, and what was beyond is lost. Take a wider range, or leave these cells empty; a motor's own limit may stay."
+        for value, beyond, times in ends
+        if times >= _OFTENER * most
     ]

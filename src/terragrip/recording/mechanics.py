@@ -8,7 +8,7 @@ then decides which of them is wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,8 +74,8 @@ class Fit:
 @dataclass(frozen=True)
 class Means:
     """Windows of driving forward (n,): ``place`` of each row of the log among all ``count`` windows, which of them are used (``rows``),
-    of which each is ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s] and g sin(pitch),
-    ``climb`` [m/s²], if the log has it."""
+    of which each is ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s], g sin(pitch),
+    ``climb`` [m/s²], if the log has it, and each driven wheel's share of the ``thrusts`` (`thrusts_of`), if they are known."""
 
     place: Ints
     count: int
@@ -84,6 +84,12 @@ class Means:
     speed: Floats
     climb: Floats | None = None
     length: float = _WINDOW
+    thrusts: dict[str, Floats] = field(default_factory=dict)
+
+    @property
+    def thrust(self) -> Floats:
+        """All thrust less the drawbar force, over the mass (n,) [m/s²]."""
+        return np.asarray(np.sum(list(self.thrusts.values()), axis=0))
 
     def of(self, values: Floats) -> Floats:
         """A channel (rows,) as means over the stretch of ``change`` (n,)."""
@@ -117,11 +123,8 @@ class Means:
         return Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else Fit()
 
 
-def motion_warnings(
-    recording: Recording, vehicle: Vehicle | None, means: Means | None, thrusts: dict[str, Floats]
-) -> list[str]:
-    """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change;
-    ``thrusts``: those of `thrusts_of`."""
+def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means | None) -> list[str]:
+    """Sentences on accelerations, pitch, torques, radius and mass that the motion contradicts, and on sensors that never change."""
     if means is None:
         return []
     forward = (
@@ -131,26 +134,25 @@ def motion_warnings(
     if vehicle is not None and vehicle.knows_wheels:
         notes = _dead_warnings(recording, vehicle)
         notes += radius_warnings(recording, vehicle, means)
-        thrusts = {} if notes else thrusts
-        notes += _pull_warnings(means, thrusts, recording, vehicle) or _silent_cell(recording, vehicle)
+        means = replace(means, thrusts={}) if notes else means
+        notes += _pull_warnings(means, recording, vehicle) or _silent_cell(recording, vehicle)
     if forward is not None:
-        found = _balance_warnings(recording, means, forward, thrusts, vehicle)
+        found = _balance_warnings(recording, means, forward, vehicle)
         found = found or zero_warnings(recording, means, forward)
         found = (
             found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward, vehicle)
         )
     else:
-        found = _thrust_warnings(means, thrusts, vehicle)
+        found = _thrust_warnings(means, vehicle)
     return [*notes, *found]
 
 
-def shortfall_warnings(recording: Recording, means: Means | None, thrusts: dict[str, Floats]) -> list[str]:
-    """A sentence where less than nothing is left of the thrust for `_STRETCH` windows, by the pull and what shows hills; ``thrusts``: those
-    of `thrusts_of`."""
+def shortfall_warnings(recording: Recording, means: Means | None) -> list[str]:
+    """A sentence where less than nothing is left of the thrust for `_STRETCH` windows, by the pull and what shows hills."""
     hills = "acceleration_x" in recording.channels or (means is not None and means.climb is not None)
-    if means is None or not thrusts or not hills or "drawbar_force" not in recording.channels:
+    if means is None or not means.thrusts or not hills or "drawbar_force" not in recording.channels:
         return []
-    rest = (np.sum(list(thrusts.values()), axis=0) - means.moved(recording)) / STANDARD_GRAVITY
+    rest = (means.thrust - means.moved(recording)) / STANDARD_GRAVITY
     known = np.flatnonzero(np.isfinite(rest))
     if len(known) < 2 * _STRETCH:
         return []
@@ -175,8 +177,9 @@ def _ratio(pair: Floats) -> float:
     return float(np.sum(a * b)) / below if below else np.nan
 
 
-def means_of(recording: Recording) -> Means | None:
-    """None if too few windows of driving are left, or time decreases."""
+def means_of(recording: Recording, vehicle: Vehicle | None = None) -> Means | None:
+    """The windows of a log, with the thrusts of a ``vehicle`` whose wheels are known; None if too few of driving are left, or time
+    decreases."""
     speed = recording.channels.get("ground_speed")
     known = np.flatnonzero(np.isfinite(speed)) if speed is not None else ()
     if speed is None or len(known) < _LEAST:
@@ -196,10 +199,9 @@ def means_of(recording: Recording) -> Means | None:
     if rows.sum() < _LEAST:
         return None
     means = Means(place, count, rows, change[rows], mean[rows], length=length)
-    if "pitch" not in recording.channels:
-        return means
-    climb = STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"]))
-    return replace(means, climb=climb)
+    if "pitch" in recording.channels:
+        means = replace(means, climb=STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"])))
+    return means if vehicle is None else replace(means, thrusts=thrusts_of(recording, vehicle, means))
 
 
 def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str, Floats]:
@@ -215,18 +217,18 @@ def thrusts_of(recording: Recording, vehicle: Vehicle, means: Means) -> dict[str
 
 
 def _balance_warnings(
-    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], vehicle: Vehicle | None
+    recording: Recording, means: Means, forward: Floats, vehicle: Vehicle | None
 ) -> list[str]:
     """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
     moved = means.fit(forward, means.change, beside_climb=True)
     flat = "acceleration_x is not the change of ground speed"
-    if not thrusts or vehicle is None:
+    if not means.thrusts or vehicle is None:
         backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
         return [f"{flat} but its opposite: {_SIGN.format('it')}."] if backward else []
-    thrust = np.sum(list(thrusts.values()), axis=0)
+    thrust = means.thrust
     driven = means.fit(thrust, means.change, beside_climb=True)
     together = means.fit(thrust, forward)
-    exchanged = _exchanged(recording, means, forward, thrusts, together)
+    exchanged = _exchanged(recording, means, forward, together)
     if exchanged:
         return [exchanged]
     if not together.is_another_scale:
@@ -253,11 +255,10 @@ def _balance_warnings(
     ]
 
 
-def _exchanged(
-    recording: Recording, means: Means, forward: Floats, thrusts: dict[str, Floats], together: Fit
-) -> str:
+def _exchanged(recording: Recording, means: Means, forward: Floats, together: Fit) -> str:
     """Whether the balance closes with the other sign of some wheels' torques, or the accelerometer's other axis."""
     # A wheel of a wrong sign also brakes on average; in changes alone, the sharing of a pull among axles looks like a sign.
+    thrusts = means.thrusts
     backward = {w for w in thrusts if np.nanmean(means.of(recording.channels[f"drive_torque_{w}"])) < 0}
     signs = {
         w: -1 if w in backward and means.fit(own, forward).slope < 0 else 1 for w, own in thrusts.items()
@@ -265,11 +266,7 @@ def _exchanged(
     plain = abs(together.alike)
     turned = abs(means.fit(np.sum([signs[w] * own for w, own in thrusts.items()], axis=0), forward).alike)
     sideways = recording.channels.get("acceleration_y")
-    other = (
-        0.0
-        if sideways is None
-        else abs(means.fit(np.sum(list(thrusts.values()), axis=0), means.of(sideways)).alike)
-    )
+    other = 0.0 if sideways is None else abs(means.fit(means.thrust, means.of(sideways)).alike)
     if plain > _ALIKE or max(turned, other) < _CLEAR:
         return ""
     if other > turned:
@@ -278,14 +275,11 @@ def _exchanged(
     return f"{names}: the other wheels' torques vary with acceleration_x, and these against it; {_SIGN.format('each')}."
 
 
-def _thrust_warnings(means: Means, thrusts: dict[str, Floats], vehicle: Vehicle | None) -> list[str]:
+def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
     """The torques against the change of ground speed and the climb alone."""
-    if not thrusts or vehicle is None:
+    if not means.thrusts or vehicle is None:
         return []
-    moved, thrust = (
-        means.change + (0.0 if means.climb is None else means.climb),
-        np.sum(list(thrusts.values()), axis=0),
-    )
+    moved, thrust = means.change + (0.0 if means.climb is None else means.climb), means.thrust
     if means.climb is not None:
         uphill = means.fit(thrust - means.change, means.climb)
         if uphill.alike < -_ALIKE and np.nanmean(thrust) > 0:
@@ -309,14 +303,12 @@ def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     )
 
 
-def _pull_warnings(
-    means: Means, thrusts: dict[str, Floats], recording: Recording, vehicle: Vehicle
-) -> list[str]:
+def _pull_warnings(means: Means, recording: Recording, vehicle: Vehicle) -> list[str]:
     """The drawbar force against its limits: backward, and less than the wheels' thrust, over a whole drive."""
-    if "drawbar_force" not in recording.channels or not thrusts:
+    if "drawbar_force" not in recording.channels or not means.thrusts:
         return []
     pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass / STANDARD_GRAVITY
-    left = np.sum(list(thrusts.values()), axis=0) / STANDARD_GRAVITY
+    left = means.thrust / STANDARD_GRAVITY
     known = np.isfinite(pull) & np.isfinite(left)
     if known.sum() < _LEAST:
         return []

@@ -45,7 +45,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     ground, rims = recording.channels.get("ground_speed"), _rims(recording, vehicle)
     if ground is None or not rims or len(recording) < 2 * _LAGS[-1]:
         return []
-    time, speed = recording.time, _whole(recording.time, ground)
+    time, speed = recording.time, filled(recording.time, ground)
     changes = _changes(time, speed, rims)
     if changes > _GRIP:
         return [
@@ -125,16 +125,11 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     ]
 
 
-def _whole(time: Floats, values: Floats) -> Floats:
-    """Values (n,) on straight lines between those that are known; a sum shows soonest that all are known."""
-    return values if np.isfinite(values.sum()) else filled(time, values)
-
-
 def _rims(recording: Recording, vehicle: Vehicle) -> list[tuple[float, Floats]]:
     """Radius and speed (n,) [rad/s] of the wheels that have one."""
     named = [(radius, f"wheel_speed_{wheel}") for wheel, radius in vehicle.radii.items()]
     known = [(radius, recording.channels[name]) for radius, name in named if name in recording.channels]
-    filled_up = [(radius, _whole(recording.time, values)) for radius, values in known]
+    filled_up = [(radius, filled(recording.time, values)) for radius, values in known]
     return [(radius, values) for radius, values in filled_up if np.isfinite(values[:1]).all()]
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
-from terragrip.recording.level_shift import step_of
 from terragrip.recording.ranks import median
+from terragrip.recording.stretches import step_of
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
@@ -71,8 +71,8 @@ def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[s
     step = step_of(rest[known], _MOVED, beyond=_BEYOND, long=_LONG)
     if step is None:
         return []
-    leap = step.size
-    when = recording.time[0] + (np.flatnonzero(means.rows)[known][step.at] - 0.5) * means.length
+    at, leap = step
+    when = recording.time[0] + (np.flatnonzero(means.rows)[known][at] - 0.5) * means.length
     return [
         f"From {when:.4g} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
         f"before: the zero of one of the two moved, and soil resistance is {abs(leap) / STANDARD_GRAVITY:.2g} off before or after. Correct "

@@ -15,34 +15,34 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.physics.slip import middle_speed
-from terragrip.recording.axles import axle_warnings
+from terragrip.recording.axles import axle_warnings, free_axle_warnings
 from terragrip.recording.codes import without_codes
-from terragrip.recording.copies import copy_warnings
-from terragrip.recording.cut import cut_warnings
+from terragrip.recording.copies import copy_warnings, replay_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
-from terragrip.recording.free_axles import free_axle_warnings
-from terragrip.recording.frozen import frozen_warnings
+from terragrip.recording.frozen import cut_warnings, frozen_warnings
 from terragrip.recording.held import measurable
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
-from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings, thrusts_of
+from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
-from terragrip.recording.plain_units import angle_warnings, gravity_warnings, mass_warnings, spacing_warnings
-from terragrip.recording.position_speed import position_warnings
-from terragrip.recording.replays import replay_warnings
+from terragrip.recording.plain_units import (
+    angle_warnings,
+    gravity_warnings,
+    mass_warnings,
+    size_warnings,
+    spacing_warnings,
+)
 from terragrip.recording.rescaled import rescaled_warnings
 from terragrip.recording.rest import rest_warnings, torque_rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
-from terragrip.recording.speed_ratios import drive_train_warnings, rim_warnings
-from terragrip.recording.torque_signs import sign_warnings
-from terragrip.recording.torques import torque_warnings
+from terragrip.recording.speed_ratios import drive_train_warnings, position_warnings, rim_warnings
+from terragrip.recording.torques import sign_warnings, torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
 from terragrip.recording.turns import exchange_warnings
-from terragrip.recording.vehicle_sizes import size_warnings
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
@@ -125,13 +125,7 @@ class _Log:
 
     @cached_property
     def means(self) -> Means | None:
-        return means_of(self.rows)
-
-    @cached_property
-    def thrusts(self) -> dict[str, Floats]:
-        if self.means is None or not self.knows_wheels:
-            return {}
-        return thrusts_of(self.rows, self.vehicle, self.means)
+        return means_of(self.rows, self.any_vehicle if self.knows_wheels else None)
 
     @cached_property
     def courses(self) -> Courses | None:
@@ -193,7 +187,7 @@ _EACH = (
     Check("signs", lambda log: sign_warnings(log.whole, log.vehicle), _WAY),
     Check(
         "motion",
-        lambda log: motion_warnings(log.rows, log.any_vehicle, log.means, log.thrusts),
+        lambda log: motion_warnings(log.rows, log.any_vehicle, log.means),
         (*_WAY, "signs"),
         needs_wheels=False,
     ),
@@ -204,7 +198,7 @@ _EACH = (
         needs_wheels=False,
     ),
     Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
-    Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means, log.thrusts), _FORCES),
+    Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means), _FORCES),
     Check(
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
@@ -212,7 +206,7 @@ _EACH = (
     ),
     Check(
         "shortfall",
-        lambda log: shortfall_warnings(log.rows, log.means, log.thrusts),
+        lambda log: shortfall_warnings(log.rows, log.means),
         (*_COURSES, *_FORCES, "torques", "balance"),
     ),
     Check(
@@ -221,7 +215,7 @@ _EACH = (
         (*_SPEEDS, *_FORCES, "torques", "balance", "slower"),
     ),
     Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
-    Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means, log.thrusts), _WAY),
+    Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means), _WAY),
     Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
     Check("frozen", lambda log: frozen_warnings(log.whole), _TIME, needs_wheels=False),
     Check("dropouts", lambda log: dropout_warnings(log.whole), _TIME, needs_wheels=False),

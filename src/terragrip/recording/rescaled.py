@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.level_shift import instant_of, step_of
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.sides import Axle, Drive
-from terragrip.recording.stretches import DRIVING
+from terragrip.recording.stretches import DRIVING, instant_of, step_of
 from terragrip.recording.track import Track
 from terragrip.recording.turns import WINDOW, filled
 
@@ -83,19 +82,20 @@ def _of_axle(
     )
     if step is None:
         return []
+    at, size = step
     names = [f"{quantity}_{wheel}" for wheel in axle.wheels]
     raw = [filled(recording.time, recording.channels[name]) for name in names]
     driving = np.logical_and.reduce([one > DRIVING * quantile(np.abs(one), 0.95) for one in raw])
     ratio = np.full(len(recording), np.nan)
     ratio[driving] = np.log(raw[0][driving] / raw[1][driving])
-    instant = _instant(recording.time, ratio, when[rows], step.at, step.size)
+    instant = _instant(recording.time, ratio, when[rows], at, size)
     if instant is None:
         return []
-    factor, name = float(np.exp(step.size)), names[0]
+    factor, name = float(np.exp(size)), names[0]
     either = f" (or that of {names[1]} {'falls' if factor > 1 else 'rises'} as much)"
     if others:  # which of the two moved beside another axle
         either, both = "", np.log(sides[:, rows] / np.mean(others, axis=(0, 1))[rows])
-        moved = [abs(median(one[step.at :]) - median(one[: step.at])) for one in both]
+        moved = [abs(median(one[at:]) - median(one[:at])) for one in both]
         if moved[1] > moved[0]:
             factor, name = 1 / factor, names[1]
     wrong = "slip" if speed else "adhesion"
@@ -133,6 +133,6 @@ def _ground(recording: Recording, track: Track | None) -> list[str]:
     if step is None:
         return []
     return [
-        f"From about {when[starts][step.at]:.4g} s on ground_speed is {np.exp(step.size):.2f} times what it was before beside the "
+        f"From about {when[starts][step[0]]:.4g} s on ground_speed is {np.exp(step[1]):.2f} times what it was before beside the "
         "positions' speed: its scale changed, and slip is off by as much before or after. Correct it there, or estimate both parts apart."
     ]

@@ -1,6 +1,6 @@
-"""Wheel speeds and a drive train's speed against the ground speed: sentences for the user, never errors.
+"""Speeds of wheels, drive train and positions against the ground speed: sentences for the user, never errors.
 
-They are compared where both are well above standstill, by the median of their ratio.
+They are compared where both are well above standstill, by the median of their ratio. Positions are in degrees and nothing else.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import RATIOS
+from terragrip.recording.track import Track
 from terragrip.recording.turns import filled, straight_rows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
-
 
 # Ratio of wheel speed times radius to ground speed, and its cause; slip raises it by 1/(1 - slip).
 _RATIOS = (
@@ -40,6 +40,15 @@ _ENOUGH = 4000  # rows: enough to distinguish medians that differ by a third
 _APART = 1.2  # of the rims of driven wheels: front wheels lead by 5 % at most, radii are known to 10 %
 _ONE = 1.15  # quartiles of one ratio
 _GAP = 1.0  # s, or three samples: nothing was measured within it
+_OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
+_TOO_SLOW, _LONG_WAY = 1.03, 20.0  # the same, over windows of so many metres,
+_FEW, _VAGUE = (
+    10,
+    1.117,
+)  # of which at least so many go straight: else it is surely no more than this share less
+_STRAIGHT = 1.01  # both halves of a window over all of it
+_TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
+_WAY_WINDOW = 10.0  # s
 
 
 def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
@@ -49,9 +58,10 @@ def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     result: dict[str, list[tuple[str, float]]] = {}
     straight = straight_rows(recording, vehicle)
     usual: dict[str, float] = {}
+    turning = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
     ratios = {
-        wheel: _speed_ratio(recording, wheel, float(radius), straight)
-        for wheel, radius in zip(vehicle.wheels, vehicle.wheel_radius, strict=True)
+        w: None if own is None else ratio_of(recording, vehicle.radii[w] * np.where(straight, own, np.nan))
+        for w, own in turning.items()
     }
     # of wheels of unlike radii one factor is none of the radii
     known = [ratio for ratio in ratios.values() if ratio]
@@ -98,7 +108,7 @@ def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, 
     for name in (fast, slow):
         own = [recording.channels[f"wheel_speed_{w}"] for w in vehicle.axles[name].wheels]
         rims.append(np.mean([filled(recording.time, np.abs(values)) for values in own], axis=0))
-    moving = rows & (rims[0] > 0.3 * top_speed(rims[0])) & (rims[1] > 0)
+    moving = rows & (rims[0] > 0.3 * quantile(rims[0], 0.95)) & (rims[1] > 0)
     low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
     return high < _ONE * low
 
@@ -111,7 +121,8 @@ def _stands(recording: Recording, radius: float) -> bool:
 
 def drive_train_warnings(recording: Recording) -> list[str]:
     """The drive train's speed against the ground speed: both are in m/s, so a radius cannot cause a factor of 3.6."""
-    ratio = _to_ground(recording, recording.channels.get("wheel_based_speed"), 1.0)
+    turning = recording.channels.get("wheel_based_speed")
+    ratio = None if turning is None else ratio_of(recording, turning)
     if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
         return []
     high, low = "wheel_based_speed", "ground_speed"
@@ -126,33 +137,17 @@ def drive_train_warnings(recording: Recording) -> list[str]:
     return [f"wheel_based_speed is {ratio:.3g} times the ground speed: {why}."]
 
 
-def _speed_ratio(recording: Recording, wheel: str, radius: float, rows: Bools) -> float | None:
-    """Median of |wheel speed| radius / |ground speed| in ``rows`` (n,) while both move; None without enough motion."""
-    turning = recording.channels.get(f"wheel_speed_{wheel}")
-    return _to_ground(recording, None if turning is None else np.where(rows, turning, np.nan), radius)
-
-
-def _to_ground(recording: Recording, turning: Floats | None, radius: float) -> float | None:
+def ratio_of(recording: Recording, other: Floats) -> float | None:
+    """Median of |other| / |ground speed| (n,) while both move; None without enough motion, or a ground speed."""
     speed = recording.channels.get("ground_speed")
-    if speed is None or turning is None:
-        return None
-    return ratio_of(recording.time, speed, radius * turning)
-
-
-def ratio_of(time: Floats, speed: Floats, other: Floats) -> float | None:
-    """Median of |other| / |speed| (n,) while both move; None without enough motion."""
-    pairs = _pairs(time, speed, other)
+    pairs = None if speed is None else _pairs(recording.time, speed, other)
     if pairs is None:
         return None
     ground, rim = np.abs(pairs[0]), np.abs(pairs[1])
-    moving = (ground > 0.3 * top_speed(ground)) & (rim > 0.3 * top_speed(rim)) & (ground > 0) & (rim > 0)
+    moving = (
+        (ground > 0.3 * quantile(ground, 0.95)) & (rim > 0.3 * quantile(rim, 0.95)) & (ground > 0) & (rim > 0)
+    )
     return median(rim[moving] / ground[moving]) if moving.sum() >= 10 else None
-
-
-def top_speed(values: Floats) -> float:
-    """The value that 5 % of the values (n,), n > 0, exceed."""
-    rank = int(0.95 * (len(values) - 1))
-    return float(np.partition(values, rank)[rank])
 
 
 def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
@@ -169,3 +164,68 @@ def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats
         return None
     rows = rows[:: max(1, len(rows) // _ENOUGH)]
     return np.interp(time[rows], time[known], speed[known]), turning[rows]
+
+
+def position_warnings(recording: Recording, track: Track | None, *, wheels_agree: bool = False) -> list[str]:
+    """A ground speed of another unit or scale than the positions'. ``wheels_agree``: the wheel speeds go with it.
+
+    Noise of positions only adds to their speed, so a ground speed far above it is wrong whatever the noise. One far below is
+    wrong only if the positions also move further in a straight line than it allows.
+    """
+    if track is None:
+        return []
+    result = ratio_of(recording, track.at("speed", recording.time))
+    if result is None:
+        return []
+    sentence = f"ground_speed is {1 / result:.3g} times the speed of the positions"
+    if 2.9 < 1 / result < 4.4:
+        return [f"{sentence}: it may be in km/h: 1 km/h is 0.2778 m/s."]
+    if result < 1 / _TOO_FAST:
+        clock = (
+            " The wheel speeds agree with it: time may not be in seconds."
+            if wheels_agree and result < 1 / 3
+            else ""
+        )
+        return [f"{sentence}: check its unit and scale.{clock}"]
+    if 2.9 < result < 4.4 and _straight_ahead(recording, track)[0] > _OUTRUN:
+        return [f"{sentence}: it was converted from km/h, but may be in m/s."]
+    ahead, surely = _straight_ahead(recording, track, _LONG_WAY)
+    if surely > _TOO_SLOW:
+        return [
+            f"In a straight line the positions move {ahead:.3g} times as far as ground_speed does: check its unit and scale "
+            "(a knot is 1.852 km/h, a mile per hour 1.609; a radar's angle), and that latitude and longitude are not exchanged."
+        ]
+    return []
+
+
+def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> tuple[float, float]:
+    """Distance of the positions over the distance by ground speed in the same time: median over windows in motion, of those that go
+    straight where these are many; and that less three standard errors, the scatter's.
+
+    A turn only shortens a straight line between positions. ``least`` [m]: the shortest distance of a window by ground speed, larger than
+    the positions' noise.
+    """
+    speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
+    way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
+    length = max(_WAY_WINDOW, least / max(quantile(speed, 0.95), 1e-9))
+    edges = np.arange(track.time[0], track.time[-1], length / 2)
+    edges = edges[: len(edges) - (len(edges) + 1) % 2]  # two halves to a window
+    if len(edges) < 3:
+        return 0.0, 0.0
+    north, east = (np.interp(edges, track.time, x) for x in (track.north, track.east))
+    chord = np.hypot(np.diff(north[::2]), np.diff(east[::2]))
+    halves = np.hypot(np.diff(north), np.diff(east)).reshape(-1, 2).sum(axis=1)
+    edges, made = edges[::2], np.diff(np.interp(edges[::2], recording.time, way))
+    moving = made > 0.3 * quantile(made, 0.95)
+    for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
+        moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
+    straight = moving & (halves < _STRAIGHT * chord)
+    if not moving.any():
+        return 0.0, 0.0
+    rows = straight if straight.sum() >= _FEW else moving
+    ratio = chord[rows] / np.maximum(made[rows], 1e-9)
+    middle = median(ratio)
+    spread = median(
+        np.abs(ratio - middle)
+    )  # 1.4826 of it is the SD, and 1.2533/√n of that the median's error
+    return middle, middle - 5.6 * spread / np.sqrt(len(ratio)) if rows is straight else middle / _VAGUE

@@ -222,8 +222,8 @@ class Recording:
                 hint = "add it, or say 'driven: false' in the vehicle file if its axle has no drive"
                 problem = f"is missing, but the wheel {wheel} is driven"
                 raise self._unfit(f"drive_torque_{wheel}", problem, hint, "vehicle#signals-that-are-missing")
-        checks.require_hitch_height(vehicle, self.channels, self.source)
-        checks.require_hitch(vehicle, self.channels, self.source)
+        for force in ("drawbar_force", "hitch_load"):
+            checks.require_hitch(vehicle, force, self.channels, self.source)
         checks.refuse_other_mass(vehicle, self.channels, self.source)
 
     def _unfit(self, column: str, problem: str, hint: str, page: str | None = None) -> InputError:

@@ -1,28 +1,32 @@
-"""The drive torques against the drawbar force and the wheels' change of speed: sentences for the user, never errors.
+"""The drive torques against the drawbar force and the motion: sentences for the user, never errors.
 
 At every instant the wheels' thrust Σ M/r is the pull, the force that moves the mass, and a resistance (physics.md 1). So thrust follows
 the sum of the first two at once; a lag is an error of a channel, and so is a thrust that no ground bears, or a pull of another unit.
 Starts and stops distinguish the scales of all three (forces.py). Where a tool pulls unmeasured, the thrust follows an unknown force.
+
+Converters that log the size of a current, and meters of power, have no sign. Where pull and motion show that the wheels must brake, thrust
+of that size with the other sign closes the balance, and the logged one does not. Where noise, or a change of direction, takes a torque
+through 0, one without a sign turns back there, as often in a narrow band beside 0 as in the next one, where a torque that is never negative
+by nature hardly comes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.arrays import Bools, Floats
+from terragrip.arrays import Floats, Ints
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means
-from terragrip.recording.ranks import quantile
+from terragrip.recording.ranks import median, quantile
 from terragrip.recording.turns import filled
+from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
-
 
 _MOST = 1.0  # of the weight: a mean thrust over a whole drive that no ground supports
 _LEAST = 0.02  # of the weight: a thrust that is hardly ever exceeded; tires on a road need .01, and starts more (right logs: .07 at least)
@@ -35,22 +39,26 @@ _ALIKE = 0.7  # correlation at the lag
 _BETTER = 0.05  # than without it
 _FORCES = {"kN": 1e3, "daN": 10.0, "lbf": 4.448}  # N; daN is used for the kilogram's weight, too
 _FACTOR = 1.5
+_WINDOW = 1.0  # s, at least, and two samples of the ground speed
+_MOVES = 0.15  # of the speed that a twentieth of the windows exceed
+_WINDOWS = 20  # windows in motion
+_STEADY = 0.1  # m/s²: a vehicle that slows down less than that does not brake
+_BRAKES = 0.3  # m/s² of braking thrust over the mass: more than offset of torques and grade make
+_FEWEST = 4  # such windows
+_NEAR = 0.1  # of the smaller neighbour: a dip to 0, as often as to the band beside it
+_DIPS = 12  # (right logs moved up until none is negative: 10)
+_AS_HARD = 0.5  # of the braking thrust, with the other sign: a motor that is off while another brake works has none of it
 
 
-def torque_warnings(
-    recording: Recording, vehicle: Vehicle, means: Means | None, beyond_pull: dict[str, Floats]
-) -> list[str]:
-    """Sentences on torques of another scale than the pull, and on torques that are late or early; ``beyond_pull``: thrusts as
-    `thrusts_of` gives them."""
-    return _scale_warnings(recording, vehicle, means, beyond_pull) or _lag_warnings(recording, vehicle)
+def torque_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
+    """Sentences on torques of another scale than the pull, and on torques that are late or early."""
+    return _scale_warnings(recording, vehicle, means) or _lag_warnings(recording, vehicle)
 
 
-def _scale_warnings(
-    recording: Recording, vehicle: Vehicle, means: Means | None, beyond_pull: dict[str, Floats]
-) -> list[str]:
-    if means is None or not beyond_pull:
+def _scale_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
+    if means is None or not means.thrusts:
         return []
-    rest = np.sum(list(beyond_pull.values()), axis=0)
+    rest = means.thrust
     towing = "drawbar_force" in recording.channels
     pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass if towing else np.zeros_like(rest)
     thrust = rest + pull
@@ -94,61 +102,43 @@ def _pull_scale(fit: Fit) -> list[str]:
     ]
 
 
-@dataclass(frozen=True)
-class _Course:
-    """Thrust, and pull plus the rims' accelerating force, over the mass (n,) [m/s²] on points ``step`` [s] apart, while ``moving``."""
+def _courses(recording: Recording, vehicle: Vehicle) -> tuple[Floats, Floats, float] | None:
+    """Quick changes of the thrust, and of the pull plus the rims' accelerating force, over the mass (n,) [m/s²], 0 where the vehicle hardly
+    moves, and the distance [s] of their points; None where a torque or a wheel speed is missing, or the log is short."""
+    radii, channels, time = vehicle.driven_radii, recording.channels, recording.time
+    names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
+    if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
+        return None
+    found = points_of(time)
+    if found is None:
+        return None
+    points, step = found
 
-    step: float
-    thrust: Floats
-    force: Floats
-    moving: Bools
+    def at(values: Floats) -> Floats:
+        return np.interp(points, time, values)
 
-    @classmethod
-    def of(cls, recording: Recording, vehicle: Vehicle) -> _Course | None:
-        """None where a torque or a wheel speed is missing, or the log is short."""
-        radii, channels, time = vehicle.driven_radii, recording.channels, recording.time
-        names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
-        if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
-            return None
-        found = points_of(time)
-        if found is None:
-            return None
-        points, step = found
+    def known(name: str) -> Floats:
+        return filled(time, channels[name])
 
-        def at(values: Floats) -> Floats:
-            return np.interp(points, time, values)
-
-        def known(name: str) -> Floats:
-            return filled(time, channels[name])
-
-        thrusts = [known(f"drive_torque_{w}") / radius for w, radius in radii.items()]
-        thrust = at(np.sum(thrusts, axis=0)) / vehicle.mass
-        rim = at(np.mean([radius * known(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0))
-        force = np.gradient(smooth(rim, CALM, step), step)
-        if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
-            force = force + at(known("drawbar_force")) / vehicle.mass
-        moving = rim > _MOVING * quantile(rim, 0.95)
-        return cls(step, quick(thrust, step), quick(force, step), moving)
-
-    def lag(self) -> tuple[float, float, float]:
-        """The lag of the thrust [s], the correlation there, and without a lag."""
-        a, b = np.where(self.moving, self.thrust, 0.0), np.where(self.moving, self.force, 0.0)
-        return lag_of(a, b, self.step, _WITHIN)
+    thrusts = [known(f"drive_torque_{w}") / radius for w, radius in radii.items()]
+    thrust = at(np.sum(thrusts, axis=0)) / vehicle.mass
+    rim = at(np.mean([radius * known(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0))
+    force = np.gradient(smooth(rim, CALM, step), step)
+    if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
+        force = force + at(known("drawbar_force")) / vehicle.mass
+    moving = rim > _MOVING * quantile(rim, 0.95)
+    return np.where(moving, quick(thrust, step), 0.0), np.where(moving, quick(force, step), 0.0), step
 
 
 def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    course = _Course.of(recording, vehicle)
-    if course is None:
+    courses = _courses(recording, vehicle)
+    if courses is None:
         return []
-    seconds, alike, without = course.lag()
+    thrust, force, step = courses
+    seconds, alike, without = lag_of(thrust, force, step, _WITHIN)
     towing = "drawbar_force" in recording.channels
-    least = max(_LAG if towing else _UNSEEN_LAG, 2 * course.step)
-    if (
-        abs(seconds) <= least
-        or alike < _ALIKE
-        or alike - without < _BETTER
-        or abs(seconds) >= _WITHIN - course.step
-    ):
+    least = max(_LAG if towing else _UNSEEN_LAG, 2 * step)
+    if abs(seconds) <= least or alike < _ALIKE or alike - without < _BETTER or abs(seconds) >= _WITHIN - step:
         return []
     side, by = (
         ("behind", "the torques are")
@@ -165,3 +155,73 @@ def _lag_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         f"The drive torques are {abs(seconds):.2f} s {side} {what}, judged by the force that these require (correlation {alike:.2f}, "
         f"{without:.2f} unshifted): if {by} late, write 'delay: {abs(seconds):.2f} s' for it in a profile.{unseen}"
     ]
+
+
+def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where no torque is ever below 0 and they turn back at 0, or the motion shows that the wheels braked, or drove backward, as
+    hard as they pulled."""
+    radii, channels = vehicle.driven_radii, recording.channels
+    names = [f"drive_torque_{wheel}" for wheel in radii]
+    ground = channels.get("ground_speed")
+    if not names or ground is None or not all(name in channels for name in names):
+        return []
+    if min(float(np.nanmin(channels[name], initial=0.0)) for name in names) < 0.0:
+        return []
+    dips = np.sum([_dips(channels[name]) for name in names], axis=0)
+    if dips[0] >= _DIPS and dips[0] > max(dips[1] / 2, dips[2]):
+        return [
+            f"{', '.join(names)} are never below 0, but {dips[0]} times they fall to 0 from one sample to the next and rise again as far: "
+            "the torques have no sign. Log them with it (against the forward direction negative)."
+        ]
+    known = recording.time[np.isfinite(ground)]
+    if len(known) < _WINDOWS or np.any(np.diff(recording.time) < 0):
+        return []
+    length = max(_WINDOW, 2 * median(np.diff(known)))
+    place = ((recording.time - recording.time[0]) / length).astype(np.intp)
+
+    def mean(values: Floats) -> Floats:
+        plain = window_means(filled(recording.time, values), place, int(place[-1]) + 1)
+        return np.r_[np.nan, (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4, np.nan]
+
+    speed = window_means(ground, place, int(place[-1]) + 1)
+    needed = np.r_[np.nan, (speed[2:] - speed[:-2]) / (2 * length), np.nan]
+    slows = needed < -_STEADY
+    if "drawbar_force" in channels:
+        needed = needed + mean(channels["drawbar_force"]) / vehicle.mass
+    if "pitch" in channels:
+        needed = needed + STANDARD_GRAVITY * mean(np.sin(channels["pitch"]))
+    thrust = np.sum([mean(channels[n]) / r for n, r in zip(names, radii.values(), strict=True)], axis=0)
+    thrust = thrust / vehicle.mass
+    rows = np.isfinite(thrust) & np.isfinite(needed)
+    rows &= np.abs(np.nan_to_num(speed)) > _MOVES * float(np.nanquantile(np.abs(speed), 0.95))
+    ahead = rows & (speed > 0) & ~slows
+    if rows.sum() < _WINDOWS or not ahead.any():
+        return []
+    resistance = max(median((thrust - needed)[ahead]), 0.0)
+    expected = needed + np.sign(np.nan_to_num(speed)) * resistance
+    braking = rows & (expected < -_BRAKES)
+    if braking.sum() < _FEWEST:
+        return []
+    share = -float(np.sum((thrust * expected)[braking]) / np.sum(expected[braking] ** 2))
+    if share < _AS_HARD:
+        return []
+    when = float(braking.sum() * length)
+    return [
+        f"{', '.join(names)} are never below 0, but for {when:.3g} s the wheels brake or drive backward by the motion, as hard as these "
+        "say that they pull: the torques have no sign. Log them with it (against the forward direction negative)."
+    ]
+
+
+def _dips(values: Floats) -> Ints:
+    """How often a torque (n,) that is never negative dips between two samples to within `_NEAR` of 0, to as far beyond, and to 0 itself, as
+    one does that is cut there."""
+    known = values[np.isfinite(values)]
+    known = known[np.flatnonzero(np.diff(known, prepend=np.nan))]  # each value once, however long it is held
+    inner, least = known[1:-1], _NEAR * np.minimum(known[:-2], known[2:])
+    return np.array(
+        [
+            np.sum((inner > 0) & (inner < least)),
+            np.sum((inner >= least) & (inner < 2 * least)),
+            np.sum(inner == 0),
+        ]
+    )

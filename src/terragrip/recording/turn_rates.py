@@ -10,7 +10,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.lag import is_copy
 from terragrip.recording.ranks import quantile
 from terragrip.recording.track import Track
-from terragrip.recording.turns import SURE, agreement, filled, windows
+from terragrip.recording.turns import SURE, agreement, filled, side_differences, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -144,24 +144,15 @@ def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> 
     )
 
 
-def _is_filled(recording: Recording, left: Floats, right: Floats) -> bool:
-    """Whether both wheels (n,) of an axle are filled in from the ground speed, which shows no turn (docs/vehicle.md)."""
-    ground = recording.channels.get("ground_speed")
-    return ground is not None and is_copy(left, ground) and is_copy(right, ground)
-
-
 def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
-    """Yaw rate (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` selects rim speeds."""
-    parts = []
-    radius = vehicle.radii if rims else {}
-    for axle in vehicle.axles.values():
-        left, right = (recording.channels.get(f"wheel_speed_{axle.wheels[k]}") for k in (0, -1))
-        if (
-            len(axle.wheels) > 1
-            and left is not None
-            and right is not None
-            and not _is_filled(recording, left, right)
-        ):
-            part = filled(recording.time, right) - filled(recording.time, left)
-            parts.append(part * radius.get(axle.wheels[-1], 1.0))
+    """Yaw rate (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` selects rim speeds. An axle that is filled
+    in from the ground speed shows no turn (docs/vehicle.md)."""
+    ground = recording.channels.get("ground_speed")
+    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
+    measured = {
+        wheel: (vehicle.radii[wheel] if rims else 1.0) * filled(recording.time, speed)
+        for wheel, speed in speeds.items()
+        if speed is not None and not (ground is not None and is_copy(speed, ground))
+    }
+    parts = side_differences(vehicle, measured)
     return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)

@@ -28,17 +28,8 @@ def averaged(recording: Recording, step: float) -> Recording:
     starts = np.flatnonzero(np.diff(place, prepend=np.nan))
     if 2 * len(starts) > len(place):
         return recording
-    rows = np.diff(starts, append=len(place))
-
-    def mean(values: Floats) -> Floats:
-        known = np.isfinite(values)
-        if known.all():
-            return np.add.reduceat(values, starts) / rows
-        number, total = (
-            np.add.reduceat(known, starts, dtype=np.intp),
-            np.add.reduceat(np.where(known, values, 0.0), starts),
-        )
-        return np.where(number > 0, total / np.maximum(number, 1), np.nan)
-
-    channels = {name: mean(values) for name, values in recording.channels.items()}
-    return replace(recording, time=mean(recording.time), channels=channels, labels={})
+    count = len(starts)
+    place = np.repeat(np.arange(count), np.diff(starts, append=len(place)))
+    channels = {name: window_means(values, place, count) for name, values in recording.channels.items()}
+    time = window_means(recording.time, place, count)
+    return replace(recording, time=time, channels=channels, labels={})
