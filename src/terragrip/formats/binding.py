@@ -118,9 +118,8 @@ def _holds(log: LogTable, column: str) -> bool:
 
 
 def _missing(column: str, log: LogTable, *, several_for: str | None = None) -> InputError:
-    close = (
-        nearest(column, log.names) if "*" not in column else None
-    )  # a pattern is near to what it was made to leave out
+    # A pattern is near to what it was made to leave out.
+    close = nearest(column, log.names) if "*" not in column else None
     hint = f"the nearest column is {close!r}" if close else f"its columns are {', '.join(log.names[:12])}"
     # of several messages, or pages of one
     alike = [name for name in log.names if f".{column}." in f".{name}."]

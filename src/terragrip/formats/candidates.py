@@ -101,9 +101,8 @@ def columns_of(
         open_ = stated is not None and (_MISSPELT.fullmatch(stated) or may_be_turns(stated))
         readable = None if open_ else stated  # the sizes tell
         if readable and name.unit and kind_of(readable) != kind_of(name.unit):
-            name = replace(
-                name, concepts=name.concepts | vocabulary.concepts_of(name.words[-1])
-            )  # ... Rad [km/h]
+            # As in ... Rad [km/h].
+            name = replace(name, concepts=name.concepts | vocabulary.concepts_of(name.words[-1]))
         unit = readable or name.unit or _unit_of_ros(column)
         result[column] = Column(column, name, unit, kind_of(unit), stated, column in several)
     return result
@@ -244,9 +243,8 @@ def _of_place(column: Column) -> list[Hint]:
     ):
         return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
     words = set(name.words)
-    torque = name.has("torque") and not (
-        "effort" in words and name.has("pull")
-    )  # effort de traction: a force
+    # Effort de traction: a force.
+    torque = name.has("torque") and not ("effort" in words and name.has("pull"))
     if torque or name.has("current", "lateral", "vertical") or name.axis in ("y", "z"):
         return []
     if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in words)):

@@ -131,9 +131,8 @@ class Evidence:
         other = self.at(pair[1], time)
         known = np.isfinite(other)
         time, a, b = time[known], first[1][known], other[known]
-        moved = np.concatenate(
-            ([True], (np.diff(a) != 0) | (np.diff(b) != 0))
-        )  # held positions are no new ones
+        # Held positions are no new ones.
+        moved = np.concatenate(([True], (np.diff(a) != 0) | (np.diff(b) != 0)))
         if moved.mean() < 0.7:  # nor is the first after a gap
             moved &= np.concatenate(([False], np.diff(time) <= _gap(time)))
         time, a, b = time[moved], a[moved], b[moved]

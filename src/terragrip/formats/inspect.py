@@ -149,9 +149,8 @@ def inspect(
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
     wheels = {channel for channel in proposals if channel.startswith("wheel_speed_")}
-    if (
-        wheels - fits.channels and wheels & fits.channels
-    ):  # a robot's profile of four wheels, of six in the log
+    # A robot's profile of four wheels, of six in the log.
+    if wheels - fits.channels and wheels & fits.channels:
         fits = Fit()
     quiet = silent(numbers, proposals, seen.units)
     warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)

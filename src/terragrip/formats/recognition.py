@@ -33,9 +33,8 @@ SURE = 0.7
 """Confidence from which a proposal carries no question mark."""
 
 _OF_WHEELS = ("wheel_speed", "drive_torque")
-_EITHER_SIDE = re.compile(
-    r"^(?!.*mot).*(antrieb|drive)", re.IGNORECASE
-)  # the drive: before the gear or behind it
+# The drive: before the gear or behind it.
+_EITHER_SIDE = re.compile(r"^(?!.*mot).*(antrieb|drive)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,8 @@ Ground = tuple[str, float]
 _TRACKS = {"rotation": (1.1, 14.0), "speed": (0.15, 5.0)}
 """Track over radius, or track in m, that the difference of right and left over the rate of turn may make; skid steering counts double."""
 _TURNING = 0.08  # rad/s: less turns too little to show a track
-_SMALL, _FAST = (
-    0.1,
-    30.0,
-)  # m, rad/s: a wheel this small that turns this fast is rarer than turns a minute called rad/s
+# m, rad/s: a wheel this small that turns this fast is rarer than turns a minute called rad/s.
+_SMALL, _FAST = 0.1, 30.0
 
 
 def surest(ranked: Mapping[str, list[Guess]], channel: str) -> Guess | None:

@@ -157,9 +157,8 @@ def acceleration_warnings(courses: Courses | None) -> list[str]:
     if courses is None or courses.shown is None:
         return []
     found = [courses.slopes(courses.shown, own)[0] for own in (courses.change, courses.rims)]
-    if not all(
-        each.is_off(_ACCELERATION) for each in found
-    ):  # a receiver that filters changes less than the rims do
+    # A receiver that filters changes less than the rims do.
+    if not all(each.is_off(_ACCELERATION) for each in found):
         return []
     flat = "acceleration_x is not the change of ground speed"
     if found[0].value < 0:

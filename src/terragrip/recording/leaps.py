@@ -133,9 +133,8 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
     when, what = known_part(drive.time, part)
     steps, result = np.diff(what), np.zeros(len(drive.middle))
     updates = np.diff(when[1:][steps != 0.0])
-    if (
-        len(what) < 6 or not len(updates) or median(updates) > _SLOWEST
-    ):  # held between values that are too far apart
+    # Held between values that are too far apart.
+    if len(what) < 6 or not len(updates) or median(updates) > _SLOWEST:
         return result
     calm = np.median(sliding_window_view(what, 3), axis=1)
     leaps = calm[3:] - calm[:-3]
@@ -143,9 +142,8 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
     rows &= np.abs(steps[2:-2] - leaps) < _HALF * np.abs(leaps)
     if rows.any():
         rows &= np.abs(leaps) > _STEPS * quantum(what)
-    at = when[
-        3:-2
-    ]  # on rough ground, or pulling hard, a wheel's torque leaps more than in the rest of the drive
+    # On rough ground, or pulling hard, a wheel's torque leaps more than in the rest of the drive.
+    at = when[3:-2]
     for k in np.flatnonzero(rows):
         first, last = np.searchsorted(at, (at[k] - LONG, at[k] + LONG))
         rows[k] = np.abs(leaps[k]) > _SURE * MAD_TO_SD * median(np.abs(leaps[first:last]))

@@ -29,10 +29,8 @@ _SPREAD = 20.0  # m
 _LONGER = ("min", "h", "d")
 
 _PART = 1200.0  # s of the log at most, in which the speeds' lag counts as one
-_DRIFT, _CERTAIN = (
-    0.2,
-    4.0,
-)  # s, and standard errors, by which the last part's lag differs from the first one's
+# s, and standard errors, by which the last part's lag differs from the first one's.
+_DRIFT, _CERTAIN = 0.2, 4.0
 _EVENLY = 0.25  # of that difference: how far the middle part's lag is from the mean of both
 
 _SHARED, _COPY = 1e-3, 2e-4  # of the speed: noise of the ground speed, and how nearly the wheels have it too
@@ -53,9 +51,8 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         ]
     rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
     some = rows[:: max(1, len(rows) // _ENOUGH)]
-    way = max(
-        _way(time[some], speed[some]), _way(time[some], _mean(rims, some))
-    )  # where either has gaps, the other has values
+    # Where either has gaps, the other has values.
+    way = max(_way(time[some], speed[some]), _way(time[some], _mean(rims, some)))
     spread = _spread(recording, rows)
     if spread > max(_SPREAD, _OUTRUN * way):
         clock = _clock(spread / max(_OUTRUN * way, 1e-9))

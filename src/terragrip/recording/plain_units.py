@@ -116,9 +116,8 @@ def spacing_warnings(recording: Recording) -> list[str]:
             f"time leaps by an hour from {recording.time[hour[0]]:.10g} s to the next row: was the clock set to summer time? Write times "
             "in UTC, or subtract 3600 s from there on; now nothing is known for an hour."
         ]
-    mean = float(recording.time[-1] - recording.time[0]) / len(
-        step
-    )  # instants of two clocks may be close by chance
+    # Instants of two clocks may be close by chance.
+    mean = float(recording.time[-1] - recording.time[0]) / len(step)
     if spacing < _SPARSE and mean > _DENSE:
         return []
     return [f"The samples are {max(spacing, mean):.3g} s apart: time may not be in seconds."]

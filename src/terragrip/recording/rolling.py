@@ -35,10 +35,8 @@ _PULLING = 0.05  # of the weight: thrust that is beyond the offsets of torques
 _MOST = 0.75  # of the windows with such a thrust
 _RADII = 0.01  # radii that are known so well are right
 _SLOWER = 0.1  # of the hub's speed: radii are known to that, or
-_RADII_SURE, _SLOWER_LEAST = (
-    4.0,
-    0.04,
-)  # to so many of the file's standard deviations, and a receiver's errors
+# to so many of the file's standard deviations, and a receiver's errors
+_RADII_SURE, _SLOWER_LEAST = 4.0, 0.04
 _SURE = 3.0  # standard errors of the receiver's noise: at 1 Hz a stretch has five of its samples
 _TURNING = 0.1  # of the hub's speed, that a length times the rate of turn comes to
 

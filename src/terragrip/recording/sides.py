@@ -189,9 +189,8 @@ def _rolling(axle: Axle, straight: Bools, least: float) -> list[str]:
     low, ratio, high = np.quantile(left / right, [0.25, 0.5, 0.75])
     if abs(np.log(max(ratio, 1e-9))) < least or low < 1 < high:
         return []
-    if (
-        low <= 0 or np.log(high / low) > _STEADY
-    ):  # a wheel that spins, or an axle that stands: a scale is one number
+    # A wheel that spins, or an axle that stands: a scale is one number.
+    if low <= 0 or np.log(high / low) > _STEADY:
         return []
     if axle.pulls is not None:  # a furrow wheel slips less, but only where the axle pulls
         light = straight & (np.abs(axle.pulls.sum(axis=0)) < _PULLING * axle.load)

@@ -42,10 +42,8 @@ _ONE = 1.15  # quartiles of one ratio
 _GAP = 1.0  # s, or three samples: nothing was measured within it
 _OUTRUN = 1.5  # straight line over distance driven: above, that distance is too short
 _TOO_SLOW, _LONG_WAY = 1.03, 20.0  # the same, over windows of so many metres,
-_FEW, _VAGUE = (
-    10,
-    1.117,
-)  # of which at least so many go straight: else it is surely no more than this share less
+# of which at least so many go straight: else it is surely no more than this share less
+_FEW, _VAGUE = 10, 1.117
 _STRAIGHT = 1.01  # both halves of a window over all of it
 _TOO_FAST = 1.3  # ground speed over the positions' speed, which noise can only increase
 _WAY_WINDOW = 10.0  # s
@@ -225,7 +223,6 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> t
     rows = straight if straight.sum() >= _FEW else moving
     ratio = chord[rows] / np.maximum(made[rows], 1e-9)
     middle = median(ratio)
-    spread = median(
-        np.abs(ratio - middle)
-    )  # 1.4826 of it is the SD, and 1.2533/√n of that the median's error
+    # 1.4826 of it is the SD, and 1.2533/√n of that the median's error.
+    spread = median(np.abs(ratio - middle))
     return middle, middle - 5.6 * spread / np.sqrt(len(ratio)) if rows is straight else middle / _VAGUE

@@ -17,15 +17,10 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 _ALIKE = 0.95  # correlation of two rates of turn that are in proportion
-_SCRUBBED, _STEERED, _MOST = (
-    0.1,
-    0.7,
-    1.25,
-)  # hubs over rims: skid-steered (measured: .45 to .62; a long one on a floor that grips turns by a fifth of that), steered, and at most
-_UNLIKE, _OFTEN = (
-    0.1,
-    0.1,
-)  # of the rims' pace from side to side, and of the driving: a turn, and much turning
+# Hubs over rims: skid-steered (measured: .45 to .62; a long one on a floor that grips turns by a fifth of that), steered, and at most.
+_SCRUBBED, _STEERED, _MOST = 0.1, 0.7, 1.25
+# Of the rims' pace from side to side, and of the driving: a turn, and much turning.
+_UNLIKE, _OFTEN = 0.1, 0.1
 
 
 def shown_turn(recording: Recording, track: Track | None) -> Floats | None:
