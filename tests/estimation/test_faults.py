@@ -443,3 +443,15 @@ def test_backwards_a_turn_is_the_mirror_image_too() -> None:
     ahead, mirrored = (estimate(one, flat) for one in (log, back))
     for name in ("slip_fl", "adhesion_fl_std", "soil_resistance_std"):
         np.testing.assert_allclose(mirrored[name][40:], ahead[name][40:], atol=1e-4, err_msg=name)
+
+
+def test_adhesion_holds_both_what_a_torque_was_and_what_it_leapt_to():
+    """Until the next sample of 1 Hz it may be a spike, or real: three SDs lay between estimate and truth."""
+    made = drive(60.0, rate=1.0)
+    log, by = made.recording, np.where((made.recording.time >= 30) & (made.recording.time < 40), 0.2, 0.0)
+    force = by * 85 * 9.81 / 2
+    torque, pull = log.channels["drive_torque_rr"] + 0.2 * force, log.channels["drawbar_force"] + force
+    told = run(log.with_channels(drive_torque_rr=torque, drawbar_force=pull))
+    off = np.abs(told["adhesion_rr"] - made.truth["adhesion_rr"] - by) / told["adhesion_rr_std"]
+    assert list(told["event"][[30, 40]]) == ["outlier", "outlier"]
+    assert np.max(off[10:]) < 2.5
