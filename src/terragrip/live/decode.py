@@ -132,10 +132,9 @@ class Decoder:
             return None
         if self._stamps.zero:
             self._first = raw if self._first is None else self._first
-            stamp = float(
-                raw - self._first
-            )  # in integers while they are: nanoseconds since 1970 need all 64 bits
-        return stamp * self._tick
+            # In integers while they are: nanoseconds since 1970 need all 64 bits.
+            stamp = self._number(TIME, raw - self._first)
+        return None if stamp is None else stamp * self._tick
 
     def _number(self, name: str, raw: Any) -> float | None:
         """A finite number, or None: missing where it is None or NaN, noted where it is anything else."""
@@ -155,14 +154,8 @@ class Decoder:
 
     def _gain(self, name: str, source: Source, columns: list[str]) -> tuple[float, float]:
         """Factor and offset from a field's number to SI: by the profile's unit, else by the one that the source states."""
-        unit = source.unit
-        if (
-            unit is None
-            and source.scale == 1.0
-            and source.over is None
-            and columns
-            and self.profile is not None
-        ):
+        unit, plain = source.unit, source.scale == 1.0 and source.over is None
+        if unit is None and plain and columns and self.profile is not None:
             unit = self.units.get(columns[0])
         return source.gain(factor_to(unit, unit_of(name) or "1") if unit else 1.0)
 
