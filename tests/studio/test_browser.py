@@ -333,6 +333,13 @@ def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, fo
     page.wait_for_selector("#curve-list")
     page.click("nav >> text=Folder")
     page.wait_for_function("() => document.querySelectorAll('.state.interrupted').length === 2")
+    served.stop()
+    page.wait_for_selector("text=does not respond; trying again")
+    page.click("a:text-is('recording.parquet')")  # 'the log has changed', for ever
+    page.wait_for_selector(".bad:has-text('The studio does not respond')")
+    served.start()
+    page.wait_for_selector("text=ready to estimate")
+    page.click("nav >> text=Folder")
     page.wait_for_function("() => document.getElementById('connection').textContent === ''")
     (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")
     page.wait_for_selector("text=late.csv")

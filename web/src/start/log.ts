@@ -81,6 +81,7 @@ export class LogPage {
   /** The folder has changed: what is said here must not be of files that are others now. */
   private async renew(): Promise<void> {
     await this.reload();
+    if (!this.look && this.read[0] !== "" && this.version(this.log) !== this.read[0]) return this.open(); // it could not be read before
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement | null;
     const found = document.getElementById("wizard-found");
     if (!select || !found) return; // still opening
