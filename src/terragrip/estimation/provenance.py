@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
@@ -51,10 +52,7 @@ def about_run(estimator: TractionEstimator, recording: dict[str, Any], *, smooth
     if estimator.turn is not None:
         about["turn"] = "positions"
     if estimator.slip_reference is not None:
-        about["zero_slip"] = {
-            wheel: {"ratio": zero.ratio, "std": zero.std, "windows": zero.windows, "doubt": zero.doubt}
-            for wheel, zero in estimator.slip_reference.zero.items()
-        }
+        about["zero_slip"] = {wheel: asdict(zero) for wheel, zero in estimator.slip_reference.zero.items()}
     plain: dict[str, Any] = json.loads(json.dumps(about))
     return plain
 

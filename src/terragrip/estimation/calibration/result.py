@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.vehicle import Vehicle
+from terragrip.vehicle_parts import Calibration as CalibrationBlock
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +73,7 @@ class Quantity:
     @property
     def applies(self) -> bool:
         """Whether it has a place in the vehicle file; what has none is a check."""
-        return self.key in _PLACES
+        return self.key in CalibrationBlock.model_fields
 
     @property
     def samples(self) -> int:
@@ -165,17 +166,6 @@ class Calibration:
         lines += [f"  {unknown.name}: {unknown.why}" for unknown in self.unknown]
         lines += ["", *(f"Note: {note}" for note in self.notes)] if self.notes else []
         return "\n".join(line.rstrip() for line in lines)
-
-
-_PLACES = {
-    "drive_torque_gain",
-    "drive_torque_offset",
-    "drawbar_offset",
-    "acceleration_bias_x",
-    "pitch_offset",
-    "wheel_radius",
-    "wheel_based_speed_gain",
-}
 
 
 def _row(quantity: Quantity) -> tuple[str, str, str, str, str]:

@@ -141,38 +141,38 @@ class GroundClassifier:
         `windows` gives the recording and time of each row. Raises InputError as `fit` does on tables that
         cannot be read, and if not fitted.
         """
-        return self._grounds(self._judge(recordings))
+        return self._grounds(self._judge(recordings)[0])
 
     def predict_proba(self, recordings: Iterable[Any]) -> Floats:
         """Probability (windows, classes) of each class in ``classes_``, given that the ground is one of them.
 
         A window without usable sensors has equal probabilities. Raises InputError as `predict`.
         """
-        return _joined([one.probabilities for one in self._judge(recordings)], len(self.classes_))
+        return self._judge(recordings)[0].probabilities
 
     def novelty(self, recordings: Iterable[Any]) -> Floats:
         """Share (windows,) of windows on known grounds, from runs not trained on, that are at least as atypical.
 
         `predict` gives unknown below ``rejection``. NaN where no usable sensor was measured. Raises InputError as `predict`.
         """
-        return _joined([one.novelty for one in self._judge(recordings)])
+        return self._judge(recordings)[0].novelty
 
     def windows(self, recordings: Iterable[Any]) -> pd.DataFrame:
         """The window of each row of a prediction: columns ``recording`` (its number), ``start`` and ``end`` [s]."""
         learnt = self._known()
-        return _windows([learnt.windows(table, self.step) for table in tables_of(recordings)], learnt)
+        starts = [learnt.windows(table, self.step) for table in tables_of(recordings)]
+        return _windows(np.concatenate([np.empty(0), *starts]), [*map(len, starts)], learnt)
 
     def judge(self, recordings: Iterable[Any]) -> pd.DataFrame:
         """All results for every window, classified once: the columns of `windows`, ``ground`` (`predict`), ``novelty`` and
         ``probability_<class>`` (`predict_proba`). Raises InputError as `predict`.
         """
-        judged = self._judge(recordings)
-        table = _windows([one.starts for one in judged], self._known())
-        table["ground"] = self._grounds(judged)
-        table["novelty"] = _joined([one.novelty for one in judged])
-        chances = _joined([one.probabilities for one in judged], len(self.classes_))
+        every, counts = self._judge(recordings)
+        table = _windows(every.starts, counts, self._known())
+        table["ground"] = self._grounds(every)
+        table["novelty"] = every.novelty
         for k, name in enumerate(self.classes_):
-            table[f"probability_{name}"] = chances[:, k]
+            table[f"probability_{name}"] = every.probabilities[:, k]
         return table
 
     def too_slow(self, recording: Any) -> list[str]:
@@ -208,17 +208,19 @@ class GroundClassifier:
         classifier.check_parameters()
         return classifier._know(learnt)
 
-    def _judge(self, recordings: Iterable[Any]) -> list[Judgement]:
-        """Classify all windows of each recording."""
+    def _judge(self, recordings: Iterable[Any]) -> tuple[Judgement, list[int]]:
+        """Classify the windows of all recordings, one recording after another; and how many each has."""
         learnt = self._known()
         self.check_parameters()
-        return [learnt.judge(table, self.step, self.smooth) for table in tables_of(recordings)]
+        judged = [learnt.judge(table, self.step, self.smooth) for table in tables_of(recordings)]
+        nothing = Judgement(np.empty(0), np.empty((0, len(self.classes_))), np.empty(0))
+        every = Judgement(*(np.concatenate(parts) for parts in zip(nothing, *judged, strict=True)))
+        return every, [len(one.starts) for one in judged]
 
-    def _grounds(self, judged: list[Judgement]) -> npt.NDArray[Any]:
+    def _grounds(self, judged: Judgement) -> npt.NDArray[Any]:
         """The likeliest class of each window, or unknown."""
-        result = _joined([one.probabilities for one in judged], len(self.classes_))
-        labels = self.classes_[result.argmax(axis=1)]
-        strange = ~(_joined([one.novelty for one in judged]) >= self.rejection)  # NaN, too
+        labels = self.classes_[judged.probabilities.argmax(axis=1)]
+        strange = ~(judged.novelty >= self.rejection)  # NaN, too
         if not strange.any():
             return labels
         if labels.dtype.kind != "U":
@@ -261,14 +263,8 @@ class GroundClassifier:
                 raise InputError(f"{value!r} is out of range", place=name, hint=hint)
 
 
-def _joined(parts: list[Floats], *columns: int) -> Floats:
-    """The recordings' rows (windows, *columns) one after another."""
-    return np.concatenate([np.empty((0, *columns)), *parts])
-
-
-def _windows(starts: list[Floats], learnt: Learnt) -> pd.DataFrame:
+def _windows(starts: Floats, counts: list[int], learnt: Learnt) -> pd.DataFrame:
     import pandas as pd
 
-    numbers = np.repeat(np.arange(len(starts)), [len(s) for s in starts])
-    begin = _joined(starts)
-    return pd.DataFrame({"recording": numbers, "start": begin, "end": begin + learnt.layout.window})
+    numbers = np.repeat(np.arange(len(counts)), counts)
+    return pd.DataFrame({"recording": numbers, "start": starts, "end": starts + learnt.layout.window})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,7 @@ from terragrip.ground.classification.windows import window_starts
 _WHOLE = 0.9  # share of a family's own features that makes it measured as it was in training
 
 
-@dataclass(frozen=True)
-class Judgement:
+class Judgement(NamedTuple):
     """Of each window the start [s] (n,), the probability (n, classes) of each class, and the novelty (n,)."""
 
     starts: Floats
