@@ -28,7 +28,7 @@ _NAMES = 1000  # of fields, beyond which a sender makes them up
 _SPARE = 0.02  # s between a delay and the window that is advised for it
 _LAYOUTS = 256  # sets of fields whose plan is kept
 
-Read = Callable[[Mapping[str, Any]], float | None]
+Read = Callable[["Decoder", Mapping[str, Any]], float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class Decoder:
         for step in plan:
             if step.rank > self._best.get(step.channel, step.rank):
                 continue  # a better source of this channel has spoken
-            value = step.read(fields)
+            value = step.read(self, fields)
             if value is not None:
                 self._best[step.channel] = step.rank
                 by_delay.setdefault(step.delay, {})[step.channel] = value
@@ -160,21 +160,20 @@ class Decoder:
         return source.gain(factor_to(unit, unit_of(name) or "1") if unit else 1.0)
 
     def _reader(self, name: str, source: Source, columns: list[str]) -> Read:
-        """What gives a channel's value of a message that has these fields."""
+        """What gives a channel's value of a message that has these fields, of whichever decoder reads it."""
         gain, offset = self._gain(name, source, columns)
         value_of, over = _combination(name, source), source.over
         checked = source.invalid if source.candidates or source.sum_of else ()
         bad = [item if isinstance(item, tuple) else (item, item) for item in checked]
 
-        def read(fields: Mapping[str, Any]) -> float | None:
-            parts = [
-                part for column in columns if (part := self._number(name, fields.get(column))) is not None
-            ]
+        def read(decoder: Decoder, fields: Mapping[str, Any]) -> float | None:
+            numbers = (decoder._number(name, fields.get(column)) for column in columns)
+            parts = [number for number in numbers if number is not None]
             if len(parts) < len(columns) or any(low <= part <= high for part in parts for low, high in bad):
                 return None
             value = value_of(parts)
             if over is not None:
-                divisor = self._number(name, fields.get(over, self._divisors[over]))
+                divisor = decoder._number(name, fields.get(over, decoder._divisors[over]))
                 if divisor is None or abs(divisor) < source.over_minimum:
                     return None
                 value /= divisor
