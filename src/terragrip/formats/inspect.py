@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import yaml
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
@@ -17,6 +18,7 @@ from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, 
 from terragrip.formats.reading import read_log, recording_of
 from terragrip.formats.recognition import Proposal, Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
+from terragrip.formats.signs import add_signs
 from terragrip.formats.spoilt import notes_on, numbers_of
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable, Sparse
@@ -148,6 +150,7 @@ def inspect(
     seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
+    add_signs(proposals, lambda own: _recording(log, seen.profile(own)), machine)
     wheels = {channel for channel in proposals if channel.startswith("wheel_speed_")}
     # A robot's profile of four wheels, of six in the log.
     if wheels - fits.channels and wheels & fits.channels:
@@ -181,9 +184,7 @@ def inspect(
         nearly=fits.nearly,
         unfit=unfit,
         refused="" if ready or fits.names else refusal(present, quiet),
-        profile=profile_text(
-            os.path.basename(str(log.source)), stamp, proposals, since_1970=seen.since_1970, dbc=databases
-        ),
+        profile=seen.profile_text(proposals, databases, os.path.basename(str(log.source))),
     )
 
 
@@ -262,6 +263,16 @@ class Seen:
         numbers = self.numbers()
         clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
         return propose(numbers, self.texts(), self.units, clocks, vocabulary, vehicle)
+
+    def profile_text(
+        self, proposals: Proposals, dbc: Sequence[str | os.PathLike[str]] = (), file: str = "a log"
+    ) -> str:
+        """The profile of proposals, YAML."""
+        return profile_text(file, self.stamp, proposals, since_1970=self.since_1970, dbc=dbc)
+
+    def profile(self, proposals: Proposals) -> Profile:
+        """That profile, loaded; raises InputError where it is none."""
+        return Profile.from_dict(yaml.safe_load(self.profile_text(proposals)))
 
     def texts(self) -> dict[str, npt.NDArray[Any]]:
         """The text columns."""

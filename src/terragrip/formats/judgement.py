@@ -47,7 +47,6 @@ class Guess:
     doubt: str = ""
     unit_doubt: str = ""
     contradicted: bool = False
-    sign: int = 1
 
     def with_finding(self, finding: Finding | None) -> Guess:
         """The guess after a check: surer, or in doubt; the unit that the sizes tell counts where none is stated."""

@@ -227,8 +227,6 @@ def _proposal(channel: str, guess: Guess, ranked: list[Guess], vehicle: Vehicle 
         give = f"motor side, needs the gear ratio: the scale is {turns}"
         if _EITHER_SIDE.match(guess.column.column):
             give = f"at the wheel (scale 1), or motor side, which needs the gear ratio: the scale is {turns}"
-    if target is not None and guess.sign < 0:
-        entry["sign"] = -1
     twin = next((g for g in others if _is_of_the_other_side(guess.column, g.column)), None)
     if channel in ("drawbar_force", "hitch_load") and twin is not None and "scale" not in entry:
         entry = {"sum_of": [entry.pop("from"), twin.column.column]} | entry

@@ -9,8 +9,9 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part
 from terragrip.recording.lag import measured
-from terragrip.recording.mechanics import PULL, Means
+from terragrip.recording.mechanics import Means
 from terragrip.recording.noise import white_noise
+from terragrip.recording.pulls import PULL
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names, speed_names
 from terragrip.recording.stretches import DRIVING, LONG, is_one_value, longest, may_last

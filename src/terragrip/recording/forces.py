@@ -17,6 +17,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import filled
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -162,7 +163,8 @@ def acceleration_warnings(courses: Courses | None) -> list[str]:
         return []
     flat = "acceleration_x is not the change of ground speed"
     if found[0].value < 0:
-        return [f"{flat} but its opposite: forward is positive: write 'sign: -1' for it in the profile."]
+        sentence = f"{flat} but its opposite: forward is positive: write 'sign: -1' for it in the profile."
+        return [WrongSign(sentence, ["acceleration_x"], "the opposite of the change of ground speed")]
     return [
         f"{flat} but {found[0].value:.2g} times that: it may be in g (write 'unit: g' in the profile), or not the axis that points forward."
     ]

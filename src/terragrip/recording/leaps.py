@@ -16,8 +16,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part, quantum
-from terragrip.recording.mechanics import PULL
 from terragrip.recording.noise import MAD_TO_SD
+from terragrip.recording.pulls import PULL
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import unit_of
 from terragrip.recording.stretches import DRIVING, LONG, gaps

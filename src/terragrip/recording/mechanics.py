@@ -15,11 +15,12 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.pitch import pitch_warnings, zero_warnings
-from terragrip.recording.ranks import median, quantile
+from terragrip.recording.pulls import PULL, pull_warnings, silent_cell
+from terragrip.recording.ranks import median
 from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.schema import rim_names
-from terragrip.recording.stretches import is_one_value
 from terragrip.recording.window_means import window_means
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -35,9 +36,7 @@ _SURE = 3.0  # standard errors
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
 _FACTOR = 1.8  # larger than an uncalibrated torque and an estimated mass change a force balance
-PULL = 0.03  # of the weight: a mean larger than any offset of a sensor
 _STRETCH = 20  # windows in which the balance leaves less than nothing (on right logs it left .036 of the weight at least)
-_NO_PULL = 1e-3  # of the weight: less than any tool, or than a load cell resolves
 _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.4  # m/s²: .04 of the weight, two degrees of mounting (right logs: .25 at most)
 _OFFSET_SURE = 4.0  # of the bias that the vehicle file states,
@@ -135,7 +134,7 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means 
         notes = _dead_warnings(recording, vehicle)
         notes += radius_warnings(recording, vehicle, means)
         means = replace(means, thrusts={}) if notes else means
-        notes += _pull_warnings(means, recording, vehicle) or _silent_cell(recording, vehicle)
+        notes += pull_warnings(means, recording, vehicle) or silent_cell(recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, vehicle)
         found = found or zero_warnings(recording, means, forward)
@@ -224,7 +223,7 @@ def _balance_warnings(
     flat = "acceleration_x is not the change of ground speed"
     if not means.thrusts or vehicle is None:
         backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
-        return [f"{flat} but its opposite: {_SIGN.format('it')}."] if backward else []
+        return [_opposite(f"{flat} but its opposite: ")] if backward else []
     thrust = means.thrust
     driven = means.fit(thrust, means.change, beside_climb=True)
     together = means.fit(thrust, forward)
@@ -235,9 +234,7 @@ def _balance_warnings(
         return []
     if moved.is_off() and moved.distance > driven.distance:
         if together.slope < 0:
-            return [
-                f"{flat} but its opposite, and the drive torques contradict it too: {_SIGN.format('it')}."
-            ]
+            return [_opposite(f"{flat} but its opposite, and the drive torques contradict it too: ")]
         return [
             f"{flat} but {1 / together.slope:.2g} times what the drive torques give for {vehicle.mass:.4g} kg: it may be in g (write "
             "'unit: g' in the profile), or not the axis that points forward."
@@ -253,6 +250,11 @@ def _balance_warnings(
         f"The drive torques over radius and mass and acceleration_x go {wrong}, and the ground speed does not show which of them is wrong: "
         "check their signs and units, the wheel radius and the mass."
     ]
+
+
+def _opposite(found: str) -> WrongSign:
+    shown = "the opposite of the change of ground speed"
+    return WrongSign(f"{found}{_SIGN.format('it')}.", ["acceleration_x"], shown)
 
 
 def _exchanged(recording: Recording, means: Means, forward: Floats, together: Fit) -> str:
@@ -271,8 +273,9 @@ def _exchanged(recording: Recording, means: Means, forward: Floats, together: Fi
         return ""
     if other > turned:
         return "acceleration_y varies with the drive torques and acceleration_x does not: the two axes may be exchanged."
-    names = ", ".join(f"drive_torque_{wheel}" for wheel, sign in signs.items() if sign < 0)
-    return f"{names}: the other wheels' torques vary with acceleration_x, and these against it; {_SIGN.format('each')}."
+    odd = [f"drive_torque_{wheel}" for wheel, sign in signs.items() if sign < 0]
+    shown = "the other wheels' torques vary with acceleration_x, and these against it"
+    return WrongSign(f"{', '.join(odd)}: {shown}; {_SIGN.format('each')}.", odd, shown)
 
 
 def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
@@ -283,9 +286,9 @@ def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
     if means.climb is not None:
         uphill = means.fit(thrust - means.change, means.climb)
         if uphill.alike < -_ALIKE and np.nanmean(thrust) > 0:
-            return [
-                "pitch falls where the wheels are driven harder at one speed: nose up is positive; write 'sign: -1' for it in the profile."
-            ]
+            shown = "falls where the wheels are driven harder at one speed"
+            sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
+            return [WrongSign(sentence, ["pitch"], shown)]
     fit = means.fit(thrust, moved)
     if fit.slope < 0 and np.nanmean(thrust) > 0:
         return []
@@ -294,61 +297,15 @@ def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
 
 def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     if scale < 0:
-        return f"The drive torques fall where the vehicle is driven harder: {_SIGN.format('each')}."
+        shown = "fall where the vehicle is driven harder"
+        names = [f"drive_torque_{wheel}" for wheel in vehicle.driven_radii]
+        return WrongSign(f"The drive torques {shown}: {_SIGN.format('each')}.", names, shown)
     return (
         f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg in this way: check the "
         "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."
         + " A trailer whose drawbar_force is not in the log looks the same."
         * (scale > 1)
     )
-
-
-def _pull_warnings(means: Means, recording: Recording, vehicle: Vehicle) -> list[str]:
-    """The drawbar force against its limits: backward, and less than the wheels' thrust, over a whole drive."""
-    if "drawbar_force" not in recording.channels or not means.thrusts:
-        return []
-    pull = means.of(recording.channels["drawbar_force"]) / vehicle.mass / STANDARD_GRAVITY
-    left = means.thrust / STANDARD_GRAVITY
-    known = np.isfinite(pull) & np.isfinite(left)
-    if known.sum() < _LEAST:
-        return []
-    moved = means.moved(recording) / STANDARD_GRAVITY
-    pulled, thrust, rest = (float(np.mean(each[known])) for each in (pull, left + pull, left - moved))
-    together = means.fit(left + pull - moved, pull)
-    if pulled < -PULL and together.slope < _SURE * together.error:  # else a trailer pushes downhill
-        return [
-            f"drawbar_force is {pulled:.2g} of the weight on average: a backward pull is positive; write 'sign: -1' for it in the profile."
-        ]
-    if rest < -PULL:
-        return [
-            f"The drive torques over the wheel radius are {thrust:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
-            "which leaves nothing to drive the vehicle: check the units of both, and that each wheel has its torque."
-        ]
-    if 0 < quantile(np.abs(pull[known]), 0.95) < _NO_PULL:
-        return [
-            "drawbar_force stays below a thousandth of the weight: it may be in kN: write 'unit: kN' for it in the profile."
-        ]
-    return []
-
-
-def _silent_cell(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A drawbar force of one value in all rows, which no cell reads; of 0 only where the vehicle file has one's noise, zero or gain."""
-    pull, unsure = recording.channels.get("drawbar_force"), vehicle.uncertainty
-    stated = (vehicle.sensors.drawbar_force, unsure.drawbar_gain, unsure.drawbar_offset)
-    if pull is None or not is_one_value(pull):
-        return []
-    value = float(pull[np.isfinite(pull)][0])
-    if value:
-        return [
-            f"drawbar_force is {value:.4g} N in all rows: a cell's zero with nothing towed, which 'terragrip calibrate' finds, or one that "
-            "is not connected, and then what a tool pulls is taken for soil resistance: leave the column out."
-        ]
-    if not (any(stated) or vehicle.calibration.drawbar_offset):
-        return []
-    return [
-        "drawbar_force is exactly 0 in all rows, which no cell reads, but the vehicle file has a cell's errors: if it was not connected, "
-        "leave the column out."
-    ]
 
 
 def _offset_warnings(means: Means, forward: Floats, vehicle: Vehicle | None) -> list[str]:

@@ -10,6 +10,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.ranks import median
 from terragrip.recording.stretches import step_of
 from terragrip.recording.window_means import window_means
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -43,9 +44,9 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     observed = forward - means.change
     fit = means.fit(observed, means.climb)
     if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
-        return [
-            "pitch falls where the accelerometer shows a climb: nose up is positive; write 'sign: -1' for it in the profile."
-        ]
+        shown = "falls where the accelerometer shows a climb"
+        sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
+        return [WrongSign(sentence, ["pitch"], shown)]
     roll = recording.channels.get("roll")
     if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(observed, means.of(np.sin(roll))).alike):
         return [

@@ -26,6 +26,7 @@ from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
+from terragrip.recording.plain_signs import plain_sign_warnings
 from terragrip.recording.plain_units import (
     angle_warnings,
     gravity_warnings,
@@ -44,6 +45,7 @@ from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
 from terragrip.recording.turns import exchange_warnings
 from terragrip.recording.window_means import averaged
+from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -63,7 +65,14 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 def warnings_by_check(recording: Recording, vehicle: Vehicle | None) -> dict[str, list[str]]:
     """Those sentences by the name of their check, of checks that found something."""
     log = _Log(recording, vehicle)
-    return {check.name: notes for check in CHECKS if (notes := log.found(check.name))}
+    found = {check.name: log.found(check.name) for check in CHECKS}
+    return {name: [str(note) for note in notes] for name, notes in found.items() if notes}
+
+
+def wrong_signs(recording: Recording, vehicle: Vehicle | None) -> list[WrongSign]:
+    """Of the sentences of `unit_warnings` those on channels of the opposite sign, each with its channels and what shows it."""
+    log = _Log(recording, vehicle)
+    return [note for check in CHECKS for note in log.found(check.name) if isinstance(note, WrongSign)]
 
 
 class _Log:
@@ -179,6 +188,12 @@ _EACH = (
         lambda log: turn_rate_warnings(
             log.rows, None if log.found("exchanged wheels") else log.any_vehicle, log.track
         ),
+        _WAY,
+        needs_wheels=False,
+    ),
+    Check(
+        "plain signs",  # with the radii the checks of torques and turns show more
+        lambda log: [] if log.knows_wheels else plain_sign_warnings(log.rows, by_wheels=log.track is None),
         _WAY,
         needs_wheels=False,
     ),

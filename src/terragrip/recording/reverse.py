@@ -15,6 +15,7 @@ from terragrip.recording.ranks import quantile
 from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, side_differences, windows
+from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -53,7 +54,12 @@ def against_warnings(recording: Recording) -> list[str]:
         return []
     other = "" if odd != known[1:] else " (or for ground_speed, if the vehicle drove backward)"
     return [
-        f"Against the direction of travel: {', '.join(odd)}. In the profile write 'sign: -1' for each{other}."
+        WrongSign(
+            f"Against the direction of travel: {', '.join(odd)}. In the profile write 'sign: -1' for each{other}.",
+            odd,
+            "against the ground speed",
+            sure=odd != known[1:],
+        )
     ]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -212,19 +213,25 @@ def _opposed(axle: Axle, straight: Bools) -> list[str]:
         return []
     left, right = axle.pulls[:, straight]
     means = axle.pulls[:, straight].mean(axis=1)
-    if (
-        not np.ptp(left)
-        or not np.ptp(right)
-        or np.prod(means) > 0
-        or np.abs(means).max() < _HARD * axle.load / 2  # offsets of a free axle have signs, too
-        or float(np.corrcoef(left, right)[0, 1]) > -_OPPOSED
-    ):
+    # Offsets of a free axle have signs, too.
+    if np.abs(means).max() < _HARD * axle.load / 2 or not are_opposed(left, right):
         return []
-    wheel = axle.wheels[int(np.argmin(means))]
-    return [
-        f"drive_torque_{wheel} falls where that of the axle's other wheel rises, straight ahead: write 'sign: -1' for it in the "
-        "profile, where forward is positive."
-    ]
+    return [opposed_note(axle.wheels[int(np.argmin(means))])]
+
+
+def are_opposed(left: Floats, right: Floats) -> bool:
+    """Whether of two wheels' torques (n,) one falls where the other rises, with means of unlike sign."""
+    if not np.ptp(left) or not np.ptp(right) or left.mean() * right.mean() > 0:
+        return False
+    return float(np.corrcoef(left, right)[0, 1]) <= -_OPPOSED
+
+
+def opposed_note(wheel: str) -> WrongSign:
+    """The sentence on the wheel whose torque is of the opposite sign."""
+    shown = "falls where that of the axle's other wheel rises, straight ahead"
+    name = f"drive_torque_{wheel}"
+    sentence = f"{name} {shown}: write 'sign: -1' for it in the profile, where forward is positive."
+    return WrongSign(sentence, [name], shown)
 
 
 def _share(axle: Axle, pulls: Floats, straight: Bools) -> float | None:

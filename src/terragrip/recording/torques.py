@@ -22,6 +22,7 @@ from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.turns import filled
 from terragrip.recording.window_means import window_means
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -71,10 +72,11 @@ def _scale_warnings(recording: Recording, vehicle: Vehicle, means: Means | None)
         ]
     left = rest - means.moved(recording)
     if mean < -_BRAKING and np.nanmean(left) < 0:  # else a slope, or a trailer, pushes
-        return [
-            f"The drive torques over the wheel radius are {mean:.2g} times the weight on average, while the vehicle drives "
-            "forward: write 'sign: -1' for each in the profile."
-        ]
+        shown = f"{mean:.2g} times the weight on average, while the vehicle drives forward"
+        sentence = (
+            f"The drive torques over the wheel radius are {shown}: write 'sign: -1' for each in the profile."
+        )
+        return [WrongSign(sentence, [f"drive_torque_{w}" for w in vehicle.driven_radii], shown)]
     most = quantile(np.abs(thrust[np.isfinite(thrust)]), 0.95) / STANDARD_GRAVITY if mean else 1.0
     if most < _LEAST:
         return [

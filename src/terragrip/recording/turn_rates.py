@@ -11,6 +11,7 @@ from terragrip.recording.lag import is_copy
 from terragrip.recording.ranks import quantile
 from terragrip.recording.track import Track
 from terragrip.recording.turns import SURE, agreement, filled, side_differences, windows
+from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -63,15 +64,19 @@ def turn_rate_warnings(recording: Recording, vehicle: Vehicle | None, track: Tra
             else "check the positions"
         )
         return [f"angular_velocity_z turns with {agreed[0]} and against {against[0]}: {doubt}."]
-    or_else = (
-        " If its sign is right, left and right wheels are exchanged."
-        if against == ["the wheels' speeds"]
-        else ""
+    return [opposite_turn(against)]
+
+
+def opposite_turn(against: list[str]) -> WrongSign:
+    """The sentence on a rate of turn that all of ``against`` contradict."""
+    alone = against == ["the wheels' speeds"]
+    or_else = " If its sign is right, left and right wheels are exchanged." if alone else ""
+    turn = f"{' and '.join(against)} turn the other way"
+    return WrongSign(
+        f"angular_velocity_z is of the wrong sign: {turn}. Left is positive: write 'sign: -1' for it in the profile.{or_else}",
+        ["angular_velocity_z"],
+        turn,
     )
-    return [
-        f"angular_velocity_z is of the wrong sign: {' and '.join(against)} turn the other way. Left is positive: write 'sign: -1' for "
-        f"it in the profile.{or_else}"
-    ]
 
 
 def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:

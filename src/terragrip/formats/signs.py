@@ -1,0 +1,95 @@
+"""Signs in proposals: what the checks of a recording say of a log as the proposed profile reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from terragrip.errors import InputError
+from terragrip.formats.recognition import Proposal, Proposals
+from terragrip.recording import Recording
+from terragrip.recording.plausibility import wrong_signs
+from terragrip.recording.schema import split_channel
+from terragrip.vehicle import Vehicle
+
+_ROUNDS = 4  # speeds first, then the torques and turns that are judged by them
+_FAST = 0.3  # of what a twentieth of the drive exceeds
+_MOSTLY = 0.75  # of such rows
+_FORCES = ("drive_torque_", "drawbar_force")
+
+
+def add_signs(
+    proposals: Proposals,
+    read: Callable[[Proposals], Recording],
+    vehicle: Vehicle | None = None,
+) -> None:
+    """Give ``sign: -1`` to proposals whose channels the motion shows to be of the opposite sign, and a doubt where it does not decide.
+
+    ``read`` gives the log as a profile of such proposals reads it; where it raises InputError nothing is changed. A ``vehicle`` counts
+    only where it has these wheels, and no number of their proposals is left to the user: its forces need torques in N m.
+    """
+    of_wheels = {c: p for c, p in proposals.items() if c.startswith(("wheel_speed_", "drive_torque_"))}
+    known = () if vehicle is None else vehicle.wheels
+    fits = all(not p.give and (split_channel(c) or ("", ""))[1] in known for c, p in of_wheels.items())
+    machine = vehicle if fits else None
+    turned: set[str] = set()
+    for _ in range(_ROUNDS):
+        try:
+            recording = read(proposals)
+        except InputError:
+            return
+        notes = wrong_signs(recording, machine)
+        named = {c: note for note in notes for c in note.channels if c in proposals and c not in turned}
+        for channel, note in named.items():
+            proposals[channel] = (
+                _turned(proposals[channel], note.shown)
+                if note.sure
+                else _doubted(proposals[channel], f"{note.shown}: 'sign: -1', for it or for that one?")
+            )
+        turned |= named.keys()
+        if not named:
+            break
+    decided = machine is not None and machine.knows_wheels
+    for channel in _backward(recording):
+        wheel = channel.removeprefix("drive_torque_")
+        if channel in turned or channel not in proposals:
+            continue
+        if not decided or f"wheel_speed_{wheel}" in turned:
+            text = "is negative in most of the drive: 'sign: -1'?"
+            proposals[channel] = _doubted(proposals[channel], text)
+
+
+def _turned(proposal: Proposal, shown: str) -> Proposal:
+    return replace(
+        proposal,
+        entry={**proposal.entry, "sign": -1},
+        evidence=(*proposal.evidence, f"with 'sign: -1': {shown}"),
+    )
+
+
+def _doubted(proposal: Proposal, doubt: str) -> Proposal:
+    return replace(proposal, confidence=round(0.5 * proposal.confidence, 2), doubt=proposal.doubt or doubt)
+
+
+def _backward(recording: Recording) -> list[str]:
+    """Torques and forces that are mostly negative where they are large, in a drive that goes forward; of torques those that are large
+    beside the others: free wheels have offsets."""
+    speed = recording.channels.get("ground_speed", np.zeros(len(recording)))
+    sizes = {
+        name: float(np.nanquantile(np.abs(values), 0.95))
+        for name, values in recording.channels.items()
+        if name.startswith(_FORCES) and np.isfinite(values).any()
+    }
+    if not np.nansum(speed) > 0:
+        return []
+    most = max((size for name, size in sizes.items() if name != "drawbar_force"), default=0.0)
+    result = []
+    for name, size in sizes.items():
+        values = recording.channels[name]
+        large = np.abs(values) > _FAST * size
+        of_the_drive = name == "drawbar_force" or size > _FAST * most
+        if of_the_drive and np.sum(values[large] < 0) > _MOSTLY * large.sum():
+            result.append(name)
+    return result

@@ -1,0 +1,106 @@
+"""Signs that inspect proposes: of what counts backward by the motion, never on a right log, and a doubt where the data do not decide."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from terragrip.formats import Inspection, inspect, read
+from terragrip.vehicle import Vehicle
+
+TIME = np.arange(0.0, 200.0, 0.1)
+SIDES = ("left", "right")
+SPEEDS = [f"{end} {side} wheel speed [rad/s]" for end in ("front", "rear") for side in SIDES]
+TORQUES = [name.replace("speed [rad/s]", "torque [N m]") for name in SPEEDS]
+RIGHT = [name for name in (*SPEEDS, *TORQUES) if "right" in name]
+PULL, YAW = "drawbar force [N]", "yaw rate [rad/s]"
+VEHICLE = {
+    "mass": 140,
+    "wheelbase": 0.7,
+    "track": 0.6,
+    "center_of_gravity_height": 0.3,
+    "hitch_height": 0.25,
+    "axles": {
+        "front": {"mass": 60, "wheels": ["fl", "fr"]},
+        "rear": {"mass": 80, "wheels": ["rl", "rr"]},
+    },
+    "wheel": {"radius": 0.2, "inertia": 0.15},
+}
+
+
+def drive() -> dict[str, np.ndarray]:
+    """Forward with turns to both sides, four equal wheels that slip 5 % and tow a plough (made up)."""
+    draws = np.random.default_rng(8)
+    speed = 1.0 + 0.3 * np.sin(TIME / 7)
+    yaw = 0.3 * np.sin(TIME / 9) * (np.sin(TIME / 23) > 0)
+    pull = 200 + 60 * np.sin(TIME / 5)
+    thrust = pull + 60 + 140 * np.gradient(speed, TIME)
+    columns = {"time": TIME, "GPS speed [m/s]": speed, PULL: pull, YAW: yaw}
+    for name, torque in zip(SPEEDS, TORQUES, strict=True):
+        columns[name] = (speed + (0.3 if "right" in name else -0.3) * yaw) / 0.95 / 0.2
+        columns[torque] = 0.2 * thrust / 4
+    return {n: v + 0.01 * draws.standard_normal(len(TIME)) * (n != "time") for n, v in columns.items()}
+
+
+def inspected(folder: Path, columns: dict[str, np.ndarray], *, known: bool) -> Inspection:
+    """What inspect says of a log, with or without the vehicle file."""
+    pd.DataFrame(columns).to_csv(folder / "log.csv", index=False)
+    return inspect(folder / "log.csv", vehicle=Vehicle.from_dict(VEHICLE) if known else None)
+
+
+def turned(found: Inspection) -> set[str]:
+    """The columns that get a sign."""
+    proposals = found.proposals.values()
+    return {column for p in proposals if p.entry.get("sign") == -1 for column in p.columns}
+
+
+@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize("odd", [[], RIGHT, RIGHT[:2], TORQUES[:1], TORQUES, [PULL], [YAW], [*RIGHT, YAW]])
+def test_what_counts_backward_gets_a_sign_and_the_profile_reads_the_right_log(
+    tmp_path: Path, odd: list[str], known: bool
+) -> None:
+    right = drive()
+    found = inspected(tmp_path, {n: -v if n in odd else v for n, v in right.items()}, known=known)
+    assert turned(found) == {name.split(" [")[0] for name in odd}
+    assert not any("sign" in proposal.doubt for proposal in found.proposals.values())
+    (tmp_path / "profile.yaml").write_text(found.profile)
+    channels = read(tmp_path / "log.csv", tmp_path / "profile.yaml").channels
+    read_back = [
+        channels[c] for c in ("wheel_speed_fr", "drive_torque_rr", "drawbar_force", "angular_velocity_z")
+    ]
+    for values, name in zip(read_back, (SPEEDS[1], TORQUES[3], PULL, YAW), strict=True):
+        np.testing.assert_allclose(values, right[name])
+
+
+def test_a_sign_says_why_in_its_line(tmp_path: Path) -> None:
+    text = inspected(
+        tmp_path, {n: -v if n in RIGHT else v for n, v in drive().items()}, known=False
+    ).to_text()
+    line = next(line for line in text.splitlines() if "wheel_speed_fr <-" in line)
+    assert "with 'sign: -1': against the ground speed" in line
+    assert "wheel_speed_fr: {from: front right wheel speed, sign: -1}" in text
+
+
+def test_motor_currents_of_a_mirrored_side_get_a_sign_though_their_scale_is_unknown(tmp_path: Path) -> None:
+    columns = {n.replace("torque [N m]", "motor current [A]"): v for n, v in drive().items() if n != PULL}
+    mirrored = {n: -v if "right" in n else v for n, v in columns.items()}
+    found = inspected(tmp_path, mirrored, known=True)
+    assert turned(found) == {n.split(" [")[0] for n in columns if "right" in n}
+
+
+@pytest.mark.parametrize("odd", [SPEEDS, TORQUES])
+def test_where_the_data_do_not_decide_a_doubt_is_named_and_no_sign(tmp_path: Path, odd: list[str]) -> None:
+    """All wheels against the ground speed (or it is the one), and all torques negative with nothing that shows the pull."""
+    right = {n: v for n, v in drive().items() if n not in (PULL, YAW)}
+    sure = inspected(tmp_path, right, known=False).proposals
+    found = inspected(tmp_path, {n: -v if n in odd else v for n, v in right.items()}, known=False)
+    assert turned(found) == set()
+    names = [n.split(" [")[0] for n in odd]
+    doubtful = {c: p for c, p in found.proposals.items() if set(p.columns) & set(names)}
+    assert len(doubtful) == 4
+    for channel, proposal in doubtful.items():
+        assert "'sign: -1'" in proposal.doubt
+        assert proposal.confidence < 0.7 < sure[channel].confidence
