@@ -51,12 +51,8 @@ def add_signs(
         turned |= named.keys()
         if not named:
             break
-    decided = machine is not None and machine.knows_wheels
     for channel in _backward(recording):
-        wheel = channel.removeprefix("drive_torque_")
-        if channel in turned or channel not in proposals:
-            continue
-        if not decided or f"wheel_speed_{wheel}" in turned:
+        if channel not in turned and channel in proposals:
             text = "is negative in most of the drive: 'sign: -1'?"
             proposals[channel] = _doubted(proposals[channel], text)
 

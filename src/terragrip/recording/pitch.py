@@ -46,7 +46,11 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
         shown = "falls where the accelerometer shows a climb"
         sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
-        return [WrongSign(sentence, ["pitch"], shown)]
+        moved = means.fit(forward, means.change, beside_climb=True)
+        if moved.slope > _SURE * moved.error:
+            return [WrongSign(sentence, ["pitch"], shown)]
+        both = "pitch and acceleration_x show opposite climbs"
+        return [WrongSign(sentence, ["pitch", "acceleration_x"], both, sure=False)]
     roll = recording.channels.get("roll")
     if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(observed, means.of(np.sin(roll))).alike):
         return [
