@@ -10,10 +10,11 @@ from pathlib import Path
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.command.build_py import build_py
+from setuptools.errors import CompileError, LinkError
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import build_pages
-from cffi_build import ROOT, bindings, extension
+from cffi_build import ROOT, SPARED, bindings, extension
 
 
 class BuildBindings(build_ext):
@@ -24,7 +25,14 @@ class BuildBindings(build_ext):
     def build_extension(self, ext: Extension) -> None:
         apart = copy(self)
         apart.build_temp = os.path.join(self.build_temp, ext.name)
-        super(BuildBindings, apart).build_extension(ext)
+        try:
+            super(BuildBindings, apart).build_extension(ext)
+        except (CompileError, LinkError):
+            if not set(SPARED) & set(ext.extra_compile_args):
+                raise
+            ext.extra_compile_args = [flag for flag in ext.extra_compile_args if flag not in SPARED]
+            ext.extra_link_args = []
+            super(BuildBindings, apart).build_extension(ext)
 
 
 class BuildPackage(build_py):

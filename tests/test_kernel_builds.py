@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from terragrip import _kernel
 from terragrip.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def run_with(build: str, code: str) -> str:
@@ -39,6 +43,24 @@ def test_portable_can_be_asked_for() -> None:
 def test_unknown_build_is_an_input_error() -> None:
     with pytest.raises(InputError, match="TERRAGRIP_KERNEL is 'sse9'; set it to portable or avx2"):
         _kernel._choose("sse9")
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_either_compiler_knows_every_flag_that_is_not_spared(
+    compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`setup.py` builds without the spared flags where they fail; clang alone could not build the package while one was none of them."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f"NOT TESTED: {compiler} is missing")
+    monkeypatch.syspath_prepend(ROOT)
+    from cffi_build import FLAGS, HIDDEN, SPARED, kernel_bindings
+
+    empty = tmp_path / "empty.c"
+    empty.write_text("int nothing;\n")
+    for binding in kernel_bindings():
+        flags = [flag for flag in (*FLAGS, HIDDEN, *binding.flags) if flag not in SPARED]
+        done = subprocess.run([compiler, *flags, "-fsyntax-only", empty], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
 
 def test_older_processor_gets_portable_and_never_loads_avx2(monkeypatch: pytest.MonkeyPatch) -> None:
