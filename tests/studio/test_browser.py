@@ -339,6 +339,7 @@ def test_a_dropped_connection_is_said_and_recovers(page: Any, served: Served, fo
     page.wait_for_selector(".bad:has-text('The studio does not respond')")
     served.start()
     page.wait_for_selector("text=ready to estimate")
+    assert page.locator(".note:has-text('does not respond')").count() == 0  # it stayed for six seconds
     page.click("nav >> text=Folder")
     page.wait_for_function("() => document.getElementById('connection').textContent === ''")
     (folder / "late.csv").write_text("time,ground_speed\n0,1\n1,1\n2,1\n")

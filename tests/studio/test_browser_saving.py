@@ -185,3 +185,19 @@ def test_a_curve_does_not_leave_the_axes_of_a_saved_fit(page: Any, served: Serve
     clipped = [g for g in root.iter(f"{SVG}g") if g.get("clip-path")]
     assert sum(len(list(g.iter(f"{SVG}circle"))) for g in clipped) > 100
     assert sum(len(list(g.iter(f"{SVG}text"))) for g in clipped) == 0  # labels stand outside
+
+
+def test_the_whole_run_as_the_file_of_another_program(
+    page: Any, served: Served, folder: Path, tmp_path: Path
+) -> None:
+    """Who wanted a .mat had to leave the studio for a command line; what the page gives is what that command writes."""
+    from scipy.io import loadmat
+
+    open_drive(page, served, "panels=slip")
+    page.click("#saving summary")
+    with page.expect_download() as waiting:
+        page.click("#whole-mat")
+    assert waiting.value.suggested_filename == "estimates.mat"
+    waiting.value.save_as(tmp_path / "estimates.mat")
+    slip = loadmat(tmp_path / "estimates.mat")["estimates"]["slip_rr"][0, 0].ravel()
+    np.testing.assert_array_equal(slip, Estimates.read(folder / "estimates.parquet")["slip_rr"])

@@ -181,3 +181,15 @@ def test_a_table_beyond_measure_is_refused_in_a_line(client: TestClient, monkeyp
     answer = client.post("/api/drive/table", json=body)
     assert answer.status_code == 422
     assert "zoom in" in answer.json()["detail"]
+
+
+def test_a_run_that_a_file_cannot_hold_is_refused_in_one_line(client: TestClient, folder: Path) -> None:
+    table = Estimates.read(folder / "estimates.parquet")
+    table.columns.pop("latitude", None)
+    table.write(folder / "nowhere.parquet")
+    wanted = {"path": "nowhere.parquet", "suffix": ".geojson"}
+    answer = client.get("/api/drive/converted", params=wanted)
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("nowhere.geojson: the log has no latitude")
+    answer = client.get("/api/drive/converted", params=wanted | {"suffix": "/../x.csv"})
+    assert answer.status_code == 422

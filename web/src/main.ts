@@ -72,7 +72,7 @@ notices.on((notice) => {
   if (notice.kind !== "connection") return;
   const state = document.getElementById("connection");
   if (state) state.textContent = notice.up ? "" : "The studio does not respond; trying again …";
-  if (notice.up) withdraw(SILENT, SHOWN);
+  if (notice.up) withdraw(SILENT);
   if (notice.up && unloaded) void open();
 });
 

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { mapOf, type Axis, type Pixel } from "../src/fit/picture";
+import { mapOf, slipDoubt, type Axis, type Pixel } from "../src/fit/picture";
 
 /** A printed diagram: rotated, skewed, scaled. Pixels of a point are made here by hand, not by the code under test. */
 function printed(turn: number, skew: number, sLog = false, muLog = false) {
@@ -49,5 +49,13 @@ describe("a calibrated picture", () => {
     expect(mapOf({ slip: good.slip, adhesion: good.slip })).toContain("same direction");
     const zero = { marks: [{ pixel: [0, 0], value: 0 }, { pixel: [9, 9], value: 1 }], log: true } as Axis;
     expect(mapOf({ ...good, slip: zero })).toContain("positive");
+  });
+});
+
+describe("slip values of an axis", () => {
+  it("are doubted where they were typed in the other unit", () => {
+    expect(slipDoubt([0, 0.006], true)).toContain("0.6 % of slip. Is it printed as a ratio, so that this is 60 %?");
+    expect(slipDoubt([0, 60], false)).toContain("6000 % of slip. Is it printed in per cent, so that this is 60 %?");
+    expect([slipDoubt([0, 0.05], true), slipDoubt([0, 1], false), slipDoubt([-0.2, 0.8], false)]).toEqual(["", "", ""]);
   });
 });

@@ -9,6 +9,7 @@ import { note, tried } from "../ui/notes";
 import { oneAtATime, type Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
 import { saveMenu } from "../ui/sheet";
+import { wholeRun } from "./convert";
 import { onUnits } from "../ui/units";
 import { Across } from "./across";
 import { AdvicePanel } from "./advice";
@@ -82,7 +83,7 @@ export const page: Page = (main, { notices, query }) => {
     { class: "tools" },
     [choice, overlay.element, over, wheels, panels, formulas.element],
     layouts(layout, takeUp),
-    saveMenu(() => ["drive", ...layers.map(({ label }) => label)].join("-"), async () => (layers.length ? sheetOf(charts, layers, across) : undefined), () => tableOf(charts, layers)),
+    saveMenu(() => ["drive", ...layers.map(({ label }) => label)].join("-"), async () => (layers.length ? sheetOf(charts, layers, across) : undefined), () => tableOf(charts, layers), wholeRun(() => path)),
     h("span", { class: "spring" }),
     [back, forward],
     h("button", { type: "button", id: "zoom-in", click: () => zoom(0.5), "aria-label": "Zoom in" }, "+"),

@@ -1,7 +1,7 @@
 /** The dialog in which a picture's axes are calibrated: two points an axis, by click, drag or number. */
 
 import { fill, h } from "../ui/dom";
-import { mapOf, type Axis, type Calibration, type Mark, type Pixel } from "./picture";
+import { mapOf, slipDoubt, type Axis, type Calibration, type Mark, type Pixel } from "./picture";
 
 type AxisName = "slip" | "adhesion";
 type Draft = Record<AxisName, { marks: (Mark | null)[]; log: boolean }>;
@@ -180,6 +180,7 @@ class Editor {
       this.side,
       h("p", { role: "status" }, lead),
       (["slip", "adhesion"] as const).map((axis) => this.axisFields(axis)),
+      this.doubt(),
       h("label", { class: "check" }, percent, "slip values in per cent"),
       h(
         "div",
@@ -194,6 +195,19 @@ class Editor {
         h("button", { type: "button", class: "primary", disabled: !ready, click: () => ready && this.done(found) }, "Use these axes"),
       ),
     );
+  }
+
+  /** Values that were typed in the other unit than the ticked one, and a button that reads them in it. */
+  private doubt(): HTMLElement | null {
+    const marks = this.draft.slip.marks;
+    const doubt = marks[0] && marks[1] ? slipDoubt([marks[0].value, marks[1].value], this.percent) : "";
+    if (!doubt) return null;
+    const reread = (): void => {
+      for (const mark of marks) if (mark) mark.value *= this.percent ? 100 : 0.01;
+      this.percent = !this.percent;
+      this.drawSide();
+    };
+    return h("p", { class: "bad", role: "alert" }, doubt, " ", h("button", { type: "button", id: "reread-slip", click: reread }, this.percent ? "It is a ratio" : "It is in per cent"));
   }
 
   private axisFields(axis: AxisName): HTMLElement {

@@ -3,6 +3,8 @@
  * a logarithmic axis is linear in the logarithm.
  */
 
+import { digits } from "../ui/dom";
+
 export type Pixel = [number, number];
 
 export interface Mark {
@@ -84,4 +86,12 @@ export function mapOf(calibration: Pick<Calibration, "slip" | "adhesion">): Pict
       return [p1.pixel[0] + alpha * u[0] + beta * v[0], p1.pixel[1] + alpha * u[1] + beta * v[1]];
     },
   };
+}
+
+/** Why slip values at an axis are hardly meant as they are read, 0.6 as 6 ‰ or 60 as 6000 %; "" where they may be. */
+export function slipDoubt(values: number[], percent: boolean): string {
+  const largest = Math.max(...values.map(Math.abs));
+  if (percent && largest <= 0.01) return `The axis ends at ${digits(100 * largest)} % of slip. Is it printed as a ratio, so that this is ${digits(1e4 * largest)} %?`;
+  if (!percent && largest > 1) return `The axis ends at ${digits(100 * largest)} % of slip. Is it printed in per cent, so that this is ${digits(largest)} %?`;
+  return "";
 }

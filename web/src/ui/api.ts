@@ -1,6 +1,6 @@
 /** The server's interface. Every failure becomes an Error whose message is the server's one line. */
 
-/** The error of a request that nobody answers; withdrawn some seconds after the studio responds again. */
+/** The error of a request that nobody answers; withdrawn when the studio responds again. */
 export const SILENT = "The studio does not respond; is it still running?";
 
 export interface Item {
@@ -111,7 +111,7 @@ export const ME = crypto.getRandomValues(new Uint32Array(2)).join("-");
 
 export type Notice = { kind: "folder" } | { kind: "job"; job: Job } | { kind: "picture"; path: string; by: string } | { kind: "connection"; up: boolean };
 
-/** Listen to the server's notices; reconnects with growing pauses when the connection drops. */
+/** Listen to the server's notices; reconnects with growing pauses, of at most two seconds, when the connection drops. */
 export class Notices {
   private listeners = new Set<(notice: Notice) => void>();
   private pause = 500;
@@ -140,7 +140,7 @@ export class Notices {
     socket.onclose = () => {
       this.tell({ kind: "connection", up: false });
       setTimeout(() => this.open(), this.pause);
-      this.pause = Math.min(this.pause * 2, 8000);
+      this.pause = Math.min(this.pause * 2, 2000);
     };
   }
 }

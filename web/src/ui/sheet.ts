@@ -41,8 +41,8 @@ export function csvOf(rows: (string | number | null | undefined)[][]): Blob {
   return new Blob([`${rows.map((row) => row.map(cell).join(",")).join("\n")}\n`], { type: "text/csv" });
 }
 
-/** The chooser: `sheet` gives the drawing and `table` the CSV of what is shown now, undefined where there is nothing; `name` of the file. */
-export function saveMenu(name: () => string, sheet: () => Promise<Sheet | undefined>, table: () => Promise<Blob | undefined>): HTMLElement {
+/** The chooser: `sheet` gives the drawing and `table` the CSV of what is shown now, undefined where there is nothing; `name` of the file; `more` below them. */
+export function saveMenu(name: () => string, sheet: () => Promise<Sheet | undefined>, table: () => Promise<Blob | undefined>, more?: HTMLElement): HTMLElement {
   const keep = async (ending: string, content: Blob | undefined): Promise<void> => void (content && save(`${name().replace(/[^\p{L}\p{N}._-]+/gu, "-")}.${ending}`, content));
   const drawn = (ending: string, make: (sheet: Sheet) => Blob | Promise<Blob>) => (): void =>
     void tried(async () => {
@@ -60,6 +60,7 @@ export function saveMenu(name: () => string, sheet: () => Promise<Sheet | undefi
       button("PNG", "A picture of what is shown", drawn("png", pngOf)),
       button("SVG", "A drawing of what is shown, for print", drawn("svg", (one) => new Blob([svgOf(one)], { type: "image/svg+xml" }))),
       button("CSV", "The rows of what is shown, with units", () => void tried(async () => keep("csv", await table()))),
+      more,
     ),
   );
 }

@@ -1,15 +1,20 @@
-"""Signals of runs: derived by a formula, one over another, and as a table to download."""
+"""Signals of runs: derived by a formula, one over another, as a table or a whole run to download."""
 
 from __future__ import annotations
 
+from pathlib import PurePosixPath
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
+from starlette.background import BackgroundTask
 
 from terragrip.errors import InputError
+from terragrip.estimation.export import KINDS
 from terragrip.studio.api.drive import BINARY, Time, recording_for, table_of
 from terragrip.studio.api.files import Named
 from terragrip.studio.formulas import LONGEST
@@ -75,6 +80,36 @@ def way(studio: Here, path: Named, axis: Axis, version: str = "") -> Response:
     rows = np.unique(np.linspace(0, len(place) - 1, min(WAY, len(place))).astype(np.intp))
     head = {"columns": ["time", axis], "count": len(rows), "cut": len(rows) < len(place)}
     return Response(packed(head, [table.time[rows], place[rows]]), media_type=BINARY)
+
+
+@router.get("/drive/kinds")
+def kinds() -> dict[str, str]:
+    """The files that a run can be had as: what each suffix is."""
+    return {suffix: kind.title for suffix, kind in KINDS.items()}
+
+
+@router.get("/drive/converted")
+def converted(studio: Here, path: Named, suffix: str) -> Response:
+    """A whole run as a file of another program, as `terragrip convert` writes it. InputError where it cannot hold the run."""
+    from terragrip.estimation.converting import convert
+
+    source, name = studio.folder.file(path), f"{PurePosixPath(path).stem}{suffix}"
+    if suffix not in KINDS:
+        raise InputError("is no kind of file for estimates", file=name, hint=f"one of {', '.join(KINDS)}")
+    place = TemporaryDirectory(prefix="terragrip-")  # not in the folder, where it would be listed as a log
+    try:
+        convert(source, f"{place.name}/{name}")
+    except InputError as error:
+        place.cleanup()
+        raise InputError(
+            error.problem, file=name if place.name in str(error.file) else path, hint=error.hint
+        ) from None
+    return FileResponse(
+        f"{place.name}/{name}",
+        media_type="application/octet-stream",
+        filename=name,
+        background=BackgroundTask(place.cleanup),
+    )
 
 
 class Part(BaseModel):
