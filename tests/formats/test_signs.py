@@ -104,3 +104,16 @@ def test_where_the_data_do_not_decide_a_doubt_is_named_and_no_sign(tmp_path: Pat
     for channel, proposal in doubtful.items():
         assert "'sign: -1'" in proposal.doubt
         assert proposal.confidence < 0.7 < sure[channel].confidence
+
+
+def test_where_it_brakes_as_much_as_it_pulls_no_torque_says_which_side_counts_backward(
+    tmp_path: Path,
+) -> None:
+    """A robot on hills: the left torque, negative by chance on average, got the sign of the right one (simulated, seed 7127)."""
+    columns = {n: v for n, v in drive().items() if n not in (PULL, YAW)}
+    columns |= dict.fromkeys(TORQUES, 10 * np.sin(TIME / 5) - 1)
+    columns |= {n: -columns[n] for n in TORQUES if "right" in n}
+    proposals = inspected(tmp_path, columns, known=False).proposals
+    for wheel in ("fl", "fr", "rl", "rr"):
+        assert "sign" not in proposals[f"drive_torque_{wheel}"].entry
+        assert "one falls where the other rises" in proposals[f"drive_torque_{wheel}"].doubt

@@ -51,9 +51,15 @@ def add_signs(
         turned |= named.keys()
         if not named:
             break
-    for channel in _backward(recording):
-        if channel not in turned and channel in proposals:
+    for channel, (share, is_large) in _negative(recording).items():
+        speed = channel.replace("drive_torque_", "wheel_speed_")
+        if channel in turned or channel not in proposals:
+            continue
+        if is_large and share > _MOSTLY:
             text = "is negative in most of the drive: 'sign: -1'?"
+            proposals[channel] = _doubted(proposals[channel], text)
+        elif speed in turned and "sign" in proposals[speed].entry and share > 1 - _MOSTLY:
+            text = "its wheel's speed counts backward: 'sign: -1' here, too?"
             proposals[channel] = _doubted(proposals[channel], text)
 
 
@@ -66,12 +72,13 @@ def _turned(proposal: Proposal, shown: str) -> Proposal:
 
 
 def _doubted(proposal: Proposal, doubt: str) -> Proposal:
-    return replace(proposal, confidence=round(0.5 * proposal.confidence, 2), doubt=proposal.doubt or doubt)
+    doubts = "; ".join(filter(None, (proposal.doubt, doubt)))
+    return replace(proposal, confidence=round(0.5 * proposal.confidence, 2), doubt=doubts)
 
 
-def _backward(recording: Recording) -> list[str]:
-    """Torques and forces that are mostly negative where they are large, in a drive that goes forward; of torques those that are large
-    beside the others: free wheels have offsets."""
+def _negative(recording: Recording) -> dict[str, tuple[float, bool]]:
+    """Of torques and forces, in a drive that goes forward, which share is negative of the values that are large, and whether a torque is
+    large beside the others': free wheels have offsets."""
     speed = recording.channels.get("ground_speed", np.zeros(len(recording)))
     sizes = {
         name: float(np.nanquantile(np.abs(values), 0.95))
@@ -79,13 +86,12 @@ def _backward(recording: Recording) -> list[str]:
         if name.startswith(_FORCES) and np.isfinite(values).any()
     }
     if not np.nansum(speed) > 0:
-        return []
+        return {}
     most = max((size for name, size in sizes.items() if name != "drawbar_force"), default=0.0)
-    result = []
+    result = {}
     for name, size in sizes.items():
         values = recording.channels[name]
         large = np.abs(values) > _FAST * size
-        of_the_drive = name == "drawbar_force" or size > _FAST * most
-        if of_the_drive and np.sum(values[large] < 0) > _MOSTLY * large.sum():
-            result.append(name)
+        share = float(np.sum(values[large] < 0)) / max(int(large.sum()), 1)
+        result[name] = (share, name == "drawbar_force" or size > _FAST * most)
     return result

@@ -221,8 +221,8 @@ def _balance_warnings(
     """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
     moved = means.fit(forward, means.change, beside_climb=True)
     flat = "acceleration_x is not the change of ground speed"
+    backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
     if not means.thrusts or vehicle is None:
-        backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
         return [_opposite(f"{flat} but its opposite: ")] if backward else []
     thrust = means.thrust
     driven = means.fit(thrust, means.change, beside_climb=True)
@@ -230,8 +230,8 @@ def _balance_warnings(
     exchanged = _exchanged(recording, means, forward, together)
     if exchanged:
         return [exchanged]
-    if not together.is_another_scale:
-        return []
+    if not together.is_another_scale:  # a hill or a pull that nobody knows hides the proportion, not the sign
+        return [_opposite(f"{flat} but its opposite: ")] if backward and together.slope < 0 else []
     if moved.is_off() and moved.distance > driven.distance:
         if together.slope < 0:
             return [_opposite(f"{flat} but its opposite, and the drive torques contradict it too: ")]

@@ -14,7 +14,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.mechanics import means_of
 from terragrip.recording.ranks import quantile
-from terragrip.recording.sides import are_opposed, opposed_note
+from terragrip.recording.sides import are_opposed, one_pulls, opposed_note
 from terragrip.recording.turn_rates import opposite_turn
 from terragrip.recording.turns import SURE, agreement, filled, windows
 from terragrip.recording.wrong_sign import WrongSign
@@ -66,8 +66,13 @@ def _opposed(recording: Recording, left: str, right: str) -> list[str]:
         return []
     means = np.array([one[rows].mean(), other[rows].mean()])
     even = abs(float(means.sum())) < _EVEN * abs(float(means[0] - means[1]))
-    odd = (left, right)[int(np.argmin(means))]
-    return [opposed_note(odd)] if even and are_opposed(one[rows], other[rows]) else []
+    if not even or not are_opposed(one[rows], other[rows]):
+        return []
+    if one_pulls(one[rows], other[rows]):
+        return [opposed_note((left, right)[int(np.argmin(means))])]
+    shown = "one falls where the other rises, straight ahead"
+    sentence = f"Of {names[2]} and {names[3]} {shown}: write 'sign: -1' for that which counts backward in the profile."
+    return [WrongSign(sentence, names[2:], shown, sure=False)]
 
 
 def _pull(recording: Recording) -> list[str]:

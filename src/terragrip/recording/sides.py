@@ -35,6 +35,7 @@ _UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 %
 _STEADY = 0.15  # quartiles of such a logarithm
 _TOGETHER = 0.95  # correlation of an axle's pulls: what they do not share is 5 % of their ratio
 _OPPOSED = 0.7  # correlation, of the other sign
+_DECIDES = 0.5  # of a torque's standard deviation over windows
 _HARD = 0.05  # of a wheel's load: mean torques of a sign
 _TURNING = 0.03  # the same, in turns: sides that are driven against each other (of 185 right axles of development none correlates below
 # -.63, and 16 of the 56 that turn so hard above .7, none between)
@@ -214,7 +215,9 @@ def _opposed(axle: Axle, straight: Bools) -> list[str]:
     left, right = axle.pulls[:, straight]
     means = axle.pulls[:, straight].mean(axis=1)
     # Offsets of a free axle have signs, too.
-    if np.abs(means).max() < _HARD * axle.load / 2 or not are_opposed(left, right):
+    if np.abs(means).max() < _HARD * axle.load / 2 or not (
+        are_opposed(left, right) and one_pulls(left, right)
+    ):
         return []
     return [opposed_note(axle.wheels[int(np.argmin(means))])]
 
@@ -224,6 +227,12 @@ def are_opposed(left: Floats, right: Floats) -> bool:
     if not np.ptp(left) or not np.ptp(right) or left.mean() * right.mean() > 0:
         return False
     return float(np.corrcoef(left, right)[0, 1]) <= -_OPPOSED
+
+
+def one_pulls(left: Floats, right: Floats) -> bool:
+    """Whether the means of two such torques (n,) are large enough beside their changes to say which wheel pulls: hills, and a drive
+    that brakes as much as it pulls, give small means of either sign."""
+    return bool(min(abs(left.mean()), abs(right.mean())) > _DECIDES * max(left.std(), right.std()))
 
 
 def opposed_note(wheel: str) -> WrongSign:
