@@ -383,3 +383,41 @@ def test_matrices_of_simulink_are_assigned_to_the_wheels(
     page.wait_for_selector(".note.error")
     page.click("nav >> text=Fit")  # an error stays, but not for another page's user
     page.wait_for_selector(".note.error", state="detached")
+
+
+def test_a_log_that_is_opened_again_is_as_it_was_left(
+    page: Any, served: Served, folder: Path, foreign: Path, made: Path
+) -> None:
+    """The proposals came again in place of the saved choice, and of several vehicles none, until an estimate had been made."""
+    for name in ("big.yaml", "robot.yaml"):
+        (folder / name).write_bytes((made / "vehicle.yaml").read_bytes())
+    page.goto(served.url)
+    choose_columns(Hand(page), foreign)
+    page.click("button[aria-label='Change the sign of ground_speed']")
+    page.select_option("#column-pitch", "")
+    page.select_option("#column-drawbar_force", "Pitch")
+    page.fill("input[aria-label='Unit of drawbar_force']", "N")
+    page.fill("#profile-output", "mine.yaml")
+    page.click("#use-columns")
+    page.wait_for_selector("#wizard-profile option[value='mine.yaml']", state="attached")
+    page.select_option("#wizard-vehicle", "robot.yaml")
+    page.wait_for_selector("#wizard-go:enabled")
+    saved = (folder / "mine.yaml").read_text()
+    page.reload()
+    page.wait_for_selector("#as-left:has-text('read by mine.yaml, vehicle robot.yaml')")
+    page.wait_for_selector("#wizard-go:enabled")
+    page.click("#choose-columns > summary")
+    assert page.input_value("#column-pitch") == ""
+    assert page.input_value("#column-drawbar_force") == "Pitch"
+    assert page.inner_text("button[aria-label='Change the sign of ground_speed']") == "\u2212"
+    assert page.input_value("#profile-output") == "mine.yaml"
+    page.once("dialog", lambda dialog: dialog.accept())
+    with page.expect_response("**/api/profile"):
+        page.click("#use-columns")
+    assert (folder / "mine.yaml").read_text() == saved
+    page.reload()
+    page.click("#propose")
+    page.wait_for_function("() => document.getElementById('column-pitch')?.value === 'Pitch'")
+    assert page.query_selector("#as-left") is None
+    assert page.input_value("#profile-output") == "day1-profile.yaml"
+    assert (folder / "mine.yaml").read_text() == saved

@@ -167,3 +167,24 @@ def test_a_file_named_like_an_option_is_a_file(client: TestClient, folder: Path)
     job = queued(client, "ground", estimates=["--help.parquet"], output="-g.json")
     assert job["state"] == "done", job["text"]
     assert (folder / "-g.json").exists()
+
+
+def test_a_profiles_choice_is_shown_by_its_names_and_nothing_of_a_larger_one(
+    client: TestClient, folder: Path
+) -> None:
+    time = np.arange(0.0, 60.0, 0.1)
+    speed = 1 + 0.3 * np.sin(time / 5)
+    table = pd.DataFrame({"time [s]": time, "gps speed [m/s]": speed})
+    for side in ("left", "right"):
+        table[f"wheel speed {side} [rad/s]"] = speed / 0.4
+    table.to_csv(folder / "odd.csv", index=False)
+    query = {"path": "odd.csv", "profile": "mine.yaml"}
+    text = "channels:\n  wheel_speed_rl: {from: wheel speed left, sign: -1}\n  mass: {constant: 900}\n"
+    (folder / "mine.yaml").write_text(text)
+    found = client.get("/api/columns", params=query).json()
+    assert found["kept"]["channels"]["wheel_speed_rl"] == {"from": "wheel speed left", "sign": -1}
+    wheels = {one["wheel"] for one in found["channels"] if one["name"].startswith("wheel_speed_")}
+    assert wheels == {"rl", "r"}  # what was proposed as l is the profile's rl
+    for more in ("rows: {column: x, equals: y}", "channels: nothing"):  # saved again, it would lose the rows
+        (folder / "mine.yaml").write_text(f"{text}{more}\n")
+        assert client.get("/api/columns", params=query).json()["kept"] is None

@@ -54,17 +54,31 @@ class LogPreview:
             for one in self.inspection.columns
         ]
 
-    def channels(self, wheels: tuple[str, ...]) -> list[dict[str, Any]]:
-        """Every channel that may be chosen, with its proposals, the likeliest first; ``wheels`` beside those that were found."""
+    def channels(
+        self, wheels: tuple[str, ...], kept: dict[str, dict[str, Any]] | None = None
+    ) -> list[dict[str, Any]]:
+        """Every channel that may be chosen, with its proposals, the likeliest first; ``wheels`` beside those that were found.
+
+        ``kept``: channels of a profile; a wheel or axle that it calls otherwise than the log has the profile's name.
+        """
         from terragrip.recording.schema import split_channel, unit_of, wheel_names_in
 
         proposals = self.inspection.proposals
-        named = dict.fromkeys((*wheel_names_in(proposals), *wheels))
+        kept = kept or {}
+        part = {name: (split_channel(name) or ("", ""))[1] for name in (*proposals, *kept)}
+        own, sources = {part[name] for name in kept}, [entry.get("from") for entry in kept.values()]
+        renamed = {
+            part[name]
+            for name, one in proposals.items()
+            if "from" in one.entry and one.entry["from"] in sources
+        } - {*own, ""}
+        proposals = {name: one for name, one in proposals.items() if part[name] not in renamed}
+        named = dict.fromkeys((*wheel_names_in((*proposals, *kept)), *wheels))
         names = [f"{quantity}_{w}" for quantity in ("wheel_speed", "drive_torque") for w in named]
         names += [name for name in TITLES if name not in ("wheel_speed", "drive_torque", "soil")]
-        names += [name for name in proposals if name not in names and name != "soil"]
+        names += [name for name in (*proposals, *kept) if name not in names and name != "soil"]
         result = []
-        for name in (*names, "soil"):
+        for name in (*dict.fromkeys(names), "soil"):
             quantity, wheel = split_channel(name) or (name, "")
             result.append(
                 {

@@ -6,6 +6,7 @@ import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { oneAtATime, type Context } from "../ui/page";
 import { onceReleased } from "../ui/press";
+import { bind, boundTo } from "./bound";
 import { focusOn, refill } from "./focus";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
@@ -40,6 +41,8 @@ export class LogPage {
   private maker: MachineMaker | undefined;
   private methods: Methods | undefined;
   private items: Item[] = [];
+  private key = ""; // the log, in its folder
+  private left = ""; // as it was left: what the log is read by and estimated with, in words
   private looks = 0;
   private hasLabels = false;
   private estimates = "";
@@ -106,18 +109,30 @@ export class LogPage {
     const used = (option: string): string => (last?.words.includes(option) ? (last.words[last.words.indexOf(option) + 1] ?? "") : "");
     this.jobs.draw();
     this.methods = await tried(() => get<Methods>("methods"));
-    const own = last ? used("--profile") : `${stemOf(this.log)}-profile.yaml`;
-    this.profile = this.of("profile").includes(own) ? own : "";
-    this.vehicle = this.of("vehicle").includes(used("--vehicle")) ? used("--vehicle") : this.onlyVehicle();
+    const bound = boundTo(this.key);
+    const there = (kind: "profile" | "vehicle", path = ""): string => (this.of(kind).includes(path) ? path : "");
+    const own = [bound.profile, last ? used("--profile") : `${stemOf(this.log)}-profile.yaml`];
+    this.profile = own.map((path) => there("profile", path)).find(Boolean) ?? "";
+    const vehicle = there("vehicle", bound.vehicle) || there("vehicle", used("--vehicle")) || there("vehicle", `${stemOf(this.log)}-vehicle.yaml`);
+    this.vehicle = vehicle || this.onlyVehicle();
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
     this.drawColumns(false); // that the log is read: a long one takes a while
-    this.look = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"));
-    if (this.look?.fitting.includes(own)) this.profile = own;
+    this.look = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), this.profile);
+    this.profile ||= this.look?.fitting.find((name) => own.includes(name)) ?? "";
+    this.left = [this.profile && `read by ${this.profile}`, vehicle && `vehicle ${vehicle}`].filter(Boolean).join(", ");
     this.drawColumns(!this.profile && !this.look?.ready);
     this.drawMachine();
     this.drawEstimate();
     await this.offerNext();
     await this.parts();
+    await this.inspect();
+  }
+
+  /** Leave the saved profile, which stays, for what is proposed. */
+  private async propose(): Promise<void> {
+    [this.profile, this.left] = ["", ""];
+    this.look = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"));
+    this.drawColumns(true);
     await this.inspect();
   }
 
@@ -138,8 +153,8 @@ export class LogPage {
   }
 
   private async reload(): Promise<void> {
-    const folder = await tried(() => get<{ items: Item[] }>("folder"));
-    if (folder) this.items = folder.items;
+    const folder = await tried(() => get<{ name: string; items: Item[] }>("folder"));
+    if (folder) [this.items, this.key] = [folder.items, `${folder.name}/${this.log}`];
   }
 
   /** Columns: whoever has a profile, or a log with our names, sees one line; else the choice. */
@@ -152,9 +167,12 @@ export class LogPage {
     const profile = choice("wizard-profile", [...new Set([...this.of("profile"), ...this.look.fitting])], this.profile, none);
     profile.addEventListener("change", () => {
       this.profile = profile.value;
+      bind(this.key, { profile: this.profile });
       void this.inspect();
     });
+    const back = this.profile ? h("button", { type: "button", id: "propose", click: () => void this.propose() }, "Back to the proposals") : null;
     refill(this.columns, [
+      this.left ? h("p", { class: "hint", id: "as-left" }, `As you left it: ${this.left}. `, back) : null,
       row("Read by", profile),
       h("details", { open: choosing, id: "choose-columns" }, h("summary", {}, "Choose the columns"), this.mapping.element),
     ]);
@@ -163,6 +181,8 @@ export class LogPage {
   private async keptProfile(profile: string): Promise<void> {
     await this.reload();
     this.profile = profile;
+    this.left = "";
+    bind(this.key, { profile });
     this.drawColumns(false);
     this.maker?.measures(this.mapping?.signals ?? "torque");
     focusOn(document.getElementById(this.vehicle ? "step-estimate" : "step-machine"));
@@ -174,6 +194,7 @@ export class LogPage {
     const select = choice("wizard-vehicle", vehicles, this.vehicle, vehicles.length ? "choose the log's vehicle" : "no vehicle file yet: make one below");
     select.addEventListener("change", () => {
       this.vehicle = select.value;
+      bind(this.key, { vehicle: this.vehicle });
       void this.parts().then(() => this.inspect());
     });
     const maker = (this.maker = new MachineMaker(this.free(`${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
@@ -189,6 +210,7 @@ export class LogPage {
   private async keptVehicle(path: string): Promise<void> {
     await this.reload();
     this.vehicle = path;
+    bind(this.key, { vehicle: path });
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement;
     fill(select, this.of("vehicle").map((name) => h("option", { value: name, selected: name === path }, name)));
     (document.getElementById("make-machine") as HTMLDetailsElement).open = false;

@@ -39,6 +39,7 @@ interface Column {
 }
 
 export interface Look {
+  kept: { time?: Entry; channels: Record<string, Entry> } | null; // what a profile chose
   rows: number;
   ready: boolean;
   fitting: string[];
@@ -65,6 +66,8 @@ export class Mapping {
   private readonly refused = h("p", { class: "bad" });
   private wheels: string[] = [];
   private own = ""; // the profile written by this page, which it may overwrite
+  private kept = new Map<string, Choice>(); // what the profile has that the choice began with
+  private profile = "";
   readonly names = new WheelNames(() => this.nameRows());
 
   constructor(
@@ -72,24 +75,39 @@ export class Mapping {
     private saved: (profile: string) => void,
   ) {}
 
-  /** Preview the log; `output` is the profile to write. */
-  async open(output: string): Promise<Look | undefined> {
+  /** Preview the log, with the choice that a `profile` has, else what is proposed; `output` is the profile to write in place of it. */
+  async open(output: string, profile = ""): Promise<Look | undefined> {
     fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
     try {
-      this.look = await get<Look>("columns", { path: this.log });
+      this.look = await get<Look>("columns", { path: this.log, profile: profile || undefined });
     } catch (error) {
       fill(this.element, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
       return undefined;
     }
+    const kept = this.look.kept;
+    this.profile = kept ? profile : "";
+    this.chosen.clear();
+    this.kept.clear();
     for (const channel of this.look.channels) {
       const best = channel.proposals[0];
-      if (best) this.chosen.set(channel.name, { column: keyOf(best), entry: { ...best.entry } });
+      const entry = kept?.channels[channel.name];
+      if (entry) this.take(channel, entry);
+      else if (best && !kept) this.chosen.set(channel.name, { column: keyOf(best), entry: { ...best.entry } });
     }
     this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
+    if (kept?.time) this.look.time = kept.time;
     this.names.of(this.look.channels);
-    this.draw(output);
+    this.draw(this.profile || output);
     return this.look;
+  }
+
+  /** Choose what the profile has for a channel: a proposal, a column, or what it makes of several. */
+  private take(channel: Channel, entry: Entry): void {
+    const proposal = channel.proposals.find((one) => entry.from !== undefined && one.entry.from === entry.from);
+    const column = proposal ? keyOf(proposal) : typeof entry.from === "string" ? entry.from : `as in ${this.profile}`;
+    this.kept.set(channel.name, { column, entry });
+    this.chosen.set(channel.name, { column, entry: { ...entry } });
   }
 
   /** Wheels and axles of the log that the vehicle does not have. */
@@ -134,7 +152,7 @@ export class Mapping {
     fill(
       this.element,
       this.refused,
-      h("p", { class: "hint" }, "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
+      h("p", { class: "hint" }, this.profile ? `The choice saved in ${this.profile}.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
       look.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
       this.timeRow(look),
@@ -183,6 +201,11 @@ export class Mapping {
       select.append(group);
     }
     const likely = new Set(channel.proposals.map(keyOf));
+    const kept = this.kept.get(channel.name);
+    if (kept && !likely.has(kept.column)) {
+      select.append(option(kept.column, kept.column, kept.column === choice?.column));
+      likely.add(kept.column);
+    }
     const rest = look.columns.filter((column) => !likely.has(column.name) && column.kind === (channel.name === "soil" ? "text" : "number"));
     const group = h("optgroup", { label: "Any other column" });
     for (const column of rest) group.append(option(column.name, column.name, column.name === choice?.column));
@@ -201,7 +224,7 @@ export class Mapping {
       choice && channel.unit ? this.unit(channel, choice, proposal, column) : h("span"),
       choice && channel.unit ? this.sign(channel, choice) : h("span"),
       column ? plot(column, choice?.entry.sign === -1) : h("span"),
-      h("p", { class: "why hint" }, reason(choice, proposal, column)),
+      h("p", { class: "why hint" }, reason(choice, proposal, column, choice && kept?.column === choice.column ? this.profile : "")),
     );
   }
 
@@ -211,7 +234,7 @@ export class Mapping {
       if (field.value.trim()) choice.entry.unit = field.value.trim();
       else delete choice.entry.unit;
     });
-    if (!proposal?.give) return field;
+    if (!proposal?.give && choice.entry.scale === undefined) return field;
     const scale = h("input", { type: "number", step: "any", class: "unit", value: String(choice.entry.scale ?? 1), "aria-label": `Scale of ${channel.name}` });
     scale.addEventListener("change", () => (choice.entry.scale = Number(scale.value) || 1));
     return h("span", { class: "two" }, h("span", {}, "×"), scale, field);
@@ -237,7 +260,8 @@ export class Mapping {
     }
     const proposal = channel.proposals.find((one) => keyOf(one) === column);
     const unit = this.look?.columns.find((one) => one.name === column)?.unit;
-    const entry = proposal ? { ...proposal.entry } : { from: column, ...(unit && channel.unit ? { unit } : {}) };
+    const kept = this.kept.get(channel.name);
+    const entry = kept?.column === column ? { ...kept.entry } : proposal ? { ...proposal.entry } : { from: column, ...(unit && channel.unit ? { unit } : {}) };
     this.chosen.set(channel.name, { column, entry });
   }
 
@@ -248,9 +272,11 @@ export class Mapping {
       this.names.focus(twice[1]);
       return;
     }
+    const isOld = output === this.profile && output !== this.own;
+    if (isOld && !confirm(`Replace ${output}?`)) return;
     const named = new Map(this.look?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
     const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [named.get(name) ?? name, choice.entry]));
-    const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, replace: output === this.own };
+    const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, replace: isOld || output === this.own };
     const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted));
     if (!kept) return;
     this.own = kept.path;
@@ -267,10 +293,11 @@ function keyOf(proposal: Proposal): string {
   return proposal.columns.length === 1 && "from" in proposal.entry ? (proposal.columns[0] as string) : `from ${proposal.columns.join(", ")}`;
 }
 
-function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined): string {
+function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined, profile: string): string {
   if (!choice) return "";
   const fine = digits(column?.minimum) === digits(column?.maximum) ? 7 : 3; // a field's longitudes differ from the fifth digit on
   const range = column && column.minimum !== null ? `${digits(column.minimum, fine)} to ${digits(column.maximum, fine)}, median ${digits(column.median, fine)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
+  if (profile) return `as saved in ${profile}${range && `; ${range}`}`;
   if (!proposal) return `chosen by you; ${range}`;
   const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [proposal.give] : [])];
   return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ").replace(/\?$/, "")}. ${range}`;

@@ -28,17 +28,20 @@ class ProfileRequest(BaseModel):
 
 
 @router.get("/columns")
-def columns_of(studio: Here, path: Named, vehicle: str = "") -> dict[str, Any]:
+def columns_of(studio: Here, path: Named, vehicle: str = "", profile: str = "") -> dict[str, Any]:
     """What a log holds, with an outline of each column, and what each channel may be made of, the likeliest first.
 
-    With a vehicle its wheels are among the channels, whether a column looks like theirs or not.
+    With a vehicle its wheels are among the channels, whether a column looks like theirs or not. With a profile the channels have the
+    names that it gives them, and ``kept`` is its choice, `time` and `channels`; null where it has more than a choice of columns.
     """
     from terragrip.vehicle import Vehicle
 
     look = studio.logs.get(studio.folder.file(path))
     wheels = tuple(Vehicle.load(studio.folder.file(vehicle)).wheels) if vehicle else ()
+    kept = _choice(studio.folder.file(profile)) if profile else None
     plain: dict[str, Any] = finite(
         {
+            "kept": kept,
             "rows": look.inspection.rows,
             "ready": look.inspection.ready,
             "fitting": look.inspection.fitting,
@@ -48,7 +51,7 @@ def columns_of(studio: Here, path: Named, vehicle: str = "") -> dict[str, Any]:
             ],
             "time": look.time(),
             "columns": look.columns(),
-            "channels": look.channels(wheels),
+            "channels": look.channels(wheels, kept["channels"] if kept else None),
         }
     )
     return plain
@@ -85,6 +88,19 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
             )
         _read_some(log, temporary)
     return {"path": wanted.output, "text": text}
+
+
+def _choice(profile: Path) -> dict[str, Any] | None:
+    """A profile's `time` and `channels`; None where `save_profile` would lose something of it."""
+    from terragrip.formats import Profile
+
+    try:
+        whole = {key: part for key, part in Profile.load(profile).to_dict().items() if part}
+    except InputError:  # said where the log is read by it
+        return None
+    time = set(whole.get("time", ()))
+    plain = {"channels"} <= set(whole) <= {"time", "channels"} and time <= {"from", "unit", "zero"}
+    return whole if plain else None
 
 
 def _read_some(log: Path, profile: Path) -> None:
