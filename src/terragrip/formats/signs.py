@@ -14,7 +14,6 @@ from terragrip.recording.plausibility import wrong_signs
 from terragrip.recording.schema import split_channel
 from terragrip.vehicle import Vehicle
 
-_ROUNDS = 4  # speeds first, then the torques and turns that are judged by them
 _FAST = 0.3  # of what a twentieth of the drive exceeds
 _MOSTLY = 0.75  # of such rows
 _FORCES = ("drive_torque_", "drawbar_force")
@@ -35,7 +34,7 @@ def add_signs(
     fits = all(not p.give and (split_channel(c) or ("", ""))[1] in known for c, p in of_wheels.items())
     machine = vehicle if fits else None
     turned: set[str] = set()
-    for _ in range(_ROUNDS):
+    while True:  # speeds first, then the torques and turns that are judged by them, one by one
         try:
             recording = read(proposals)
         except InputError:
