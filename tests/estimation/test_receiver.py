@@ -105,3 +105,20 @@ def test_wheels_filled_in_from_the_ground_speed_show_no_turn() -> None:
     data["axles"]["front"]["driven"] = False
     notes = unit_warnings(replace(log, channels=kept | free), Vehicle.from_dict(data))
     assert not [note for note in notes if "hubs differ" in note]
+
+
+def test_a_machine_without_a_left_and_a_right_wheel_may_have_an_antenna() -> None:
+    """With a yaw rate besides, the search for turns that no sensor shows ended in a ValueError."""
+    axles = {"front": {"mass": 20, "wheels": ["front"]}, "rear": {"mass": 25, "wheels": ["rear"]}}
+    sizes = {"mass": 45, "wheelbase": 1.1, "center_of_gravity_height": 0.4, "antenna": {"x": 0.5}}
+    bicycle = Vehicle.from_dict({**sizes, "axles": axles, "wheel": {"radius": 0.3, "inertia": 0.05}})
+    time = np.arange(0, 40, 0.05)
+    columns = {"time": time, "ground_speed": np.hypot(1.5, 0.5 * 0.2), "angular_velocity_z": 0.2}
+    for wheel in bicycle.wheels:
+        columns |= {
+            f"wheel_speed_{wheel}": 1.5 / (1 - SLIP) / 0.3,
+            f"drive_torque_{wheel}": 0.3 * 22 * G * 0.06,
+        }
+    log = Recording.from_frame({name: values + np.zeros(len(time)) for name, values in columns.items()})
+    found = estimate(log, bicycle)
+    assert np.median(found["slip_rear"]) == pytest.approx(SLIP, abs=0.01)

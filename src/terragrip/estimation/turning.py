@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -122,12 +122,13 @@ def _silences(log: Recording) -> Floats:
 
 def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
     """A sentence on a rate of turn that is missing, or silent: the estimator then assumes straight driving."""
-    if np.any(np.diff(log.time) < 0):  # refused where the estimator meets it
+    sides = [[rim for rim in rims if rim.side * sign > 0] for sign in (1, -1)]
+    if not all(sides) or np.any(np.diff(log.time) < 0):  # the latter is refused where the estimator meets it
         return []
     names = [*(rim.channel for rim in rims), *([_YAW_RATE] if _YAW_RATE in log.channels else [])]
     speeds = {name: log.channels[name] for name in names}
     calm = averaged(replace(log, channels=speeds, labels={}), _WINDOW).channels
-    left, right = (_rim_means([rim for rim in rims if rim.side * sign > 0], calm) for sign in (1, -1))
+    left, right = (np.mean([rim.radius * calm[rim.channel] for rim in side], axis=0) for side in sides)
     with np.errstate(invalid="ignore"):
         mean = np.abs(left + right) / 2
         moving, turning = mean > _MOVING, np.abs(left - right) > _TURNING * mean
@@ -140,8 +141,3 @@ def _unseen_turns(log: Recording, rims: Sequence[Rim]) -> list[str]:
         f"The rims of left and right differ in {share:.0%} of the driving, where no signal shows how fast the machine turned: the slips of "
         f"both sides may be wrong by that, which their intervals hold. {advice}."
     ]
-
-
-def _rim_means(rims: Sequence[Rim], speeds: Mapping[str, Floats]) -> Floats:
-    """Mean rim speed (windows,) [m/s] of some wheels, NaN where one was not measured."""
-    return np.mean([rim.radius * speeds[rim.channel] for rim in rims] or [np.full(1, np.nan)], axis=0)
