@@ -41,9 +41,8 @@ from which_tests import KEPT, ROOT, Coverage, coverage_at, git
 ROOMS = ("physics", "recording", "estimation", "soil")
 BUDGET = 10.0  # s (under coverage) of the tests that one mutant meets
 INTERNAL = 3  # exit code of pytest: an error of its own, which would pass for a kill
-PATIENCE = (
-    4.0  # times what its tests took before, and a minute [s of processor]: beyond, a mutant counts as killed
-)
+# Times what its tests took before, and a minute [s of processor]: beyond, a mutant counts as killed.
+PATIENCE = 4.0
 HANGS = 20.0  # times that on the wall's clock, for what waits without working
 TIMED_OUT = -int(signal.SIGXCPU)
 PRELOADED = (

@@ -19,9 +19,8 @@ _LAGS = (0.5, 1.0)  # s: over them the ratio is compared
 _REACH = 3.0  # s: no older value is compared with
 TAIL = 2 * _HOLD + _REACH
 """s of the rows before that a row's torque depends on."""
-_SHIFT = (
-    0.08  # change of the ratio that makes a shift: a step of a gearbox is 15 to 25 %, slip and noise less
-)
+# Change of the ratio that makes a shift: a step of a gearbox is 15 to 25 %, slip and noise less.
+_SHIFT = 0.08
 _SLOWEST = 0.07  # of √(g r): slower rims do not determine the ratio
 SHARE_STD = 0.02
 """SD of a controller's torque, which is a model's, of the reference torque."""

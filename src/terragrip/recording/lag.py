@@ -35,9 +35,8 @@ _FEW = 1000  # samples
 _CERTAIN = 2.0  # standard deviations by which an offset must exceed the explained one
 _SURE = 4.0  # the same, for an automatic correction: runs without a late sensor reach 3.4 (docs/formats.md)
 _SHARP = 0.03  # s, a standard deviation up to which _CERTAIN is enough for it: on ground that gives way it is larger
-STIFFNESS = (
-    2.0  # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85
-)
+# K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85.
+STIFFNESS = 2.0
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
 _USUAL = 0.1  # s, prior SD of a receiver's delay, before a log shows it (ours): receivers filter
 _FILTERED = 0.2  # of a lag that was corrected: a filter of first order errs by 1/e of its lag where a change begins, a mere delay does not

@@ -22,14 +22,11 @@ from terragrip.recording.wrong_sign import WrongSign
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
-_DRIVING, _STRAIGHT = (
-    0.3,
-    0.05,
-)  # of the pace that a twentieth of the windows exceed; of the pace, from side to side
+# Of the pace that a twentieth of the windows exceed; of the pace, from side to side.
+_DRIVING, _STRAIGHT = 0.3, 0.05
 _LEAST = 15  # windows of 2 s
-_EVEN = (
-    0.3  # of their difference: the sum of two mean torques of which one is turned (gains of 25 % leave .11)
-)
+# Of their difference, the sum of two mean torques of which one is turned: gains of 25 % leave .11.
+_EVEN = 0.3
 _AGAINST = 0.7  # correlation, of the other sign
 _ERRORS = 3.0  # standard errors
 

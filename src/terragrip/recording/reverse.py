@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 _FAST = 0.3  # of what a twentieth of the drive exceeds
 _SHARE = 0.03  # of the driving that is backward
 _ALIKE = 0.9  # of the rows, or windows, that have one sign
-_MOSTLY = (
-    0.75  # of the rows in motion: a ground speed without a sign is that of forward driving in most of them
-)
+# Of the rows in motion: a ground speed without a sign is that of forward driving in most of them.
+_MOSTLY = 0.75
 _FEWEST = 5  # windows, or measured rows: a line between two says nothing of what is between
 _NOISY = 0.5  # of their size, by which large values of noise change at least
 _TOGETHER = 0.7  # correlation

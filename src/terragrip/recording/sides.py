@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 
 _LEAST = 15  # windows of 2 s
 _DRIVING = 0.3  # of the speed that a twentieth of the windows exceed
-_SPUN = (
-    0.5  # of the pace: wheels that leave a slower ground behind spin as their drive lets them, each by itself
-)
+# Of the pace: wheels that leave a slower ground behind spin as their drive lets them, each by itself.
+_SPUN = 0.5
 _STRAIGHT = 0.03  # of the speed: the hubs' difference by the turn
 _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _APART = 0.1  # the same, where only other axles show that it is straight: the furrow wheel of a plough slips .1 less

@@ -15,9 +15,8 @@ DRIVING = 0.3
 """Of the speed that a twentieth of the drive exceeds."""
 
 _GAP, _APART = 1.0, 3.0  # s, and times the usual distance of samples
-_LOOKS = (
-    8  # within `LONG`: samples; a value that is repeated for so long is found at half of them in succession
-)
+# Within `LONG`: samples; a value that is repeated for so long is found at half of them in succession.
+_LOOKS = 8
 _FEW = 4000  # rows that show how far rows are apart
 _STAYS = 3.0  # times what it changes from half to half of either side
 

@@ -16,10 +16,8 @@ from terragrip.vehicle import Vehicle
 UNSTATED_GAIN = 0.1
 """Relative SD of a torque channel's gain where the vehicle states none: that of motor currents and of strain gauges on a shaft."""
 
-_ALIKE, _APART = (
-    1.12,
-    1.4,
-)  # times: gains of an axle's wheels, and of two axles whose loads differ by a fifth and are exchanged
+# Times: gains of an axle's wheels, and of two axles whose loads differ by a fifth and are exchanged.
+_ALIKE, _APART = 1.12, 1.4
 _CALM = 4.0  # s: slips are compared to some tenths of a per cent
 _MOST_GAIN = 1.35  # times, either way: what is further off is no gain but wheels that did not share a curve
 _MOST_RADIUS = 0.1  # relative, from the vehicle file: tread, pressure and load together

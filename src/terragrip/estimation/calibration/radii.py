@@ -44,10 +44,8 @@ _STRAIGHT = 0.02  # relative difference of the wheels' speeds from side to side
 _GENTLE = 0.3  # likewise of the hubs, where the yaw rate is known
 _LEAST_DISTANCE = 5.0  # m of zero-pull passes
 _LOW = 0.7  # of the largest pull: windows above it do not determine the radius
-_STEEPNESS = (
-    float(np.log(5.0)),
-    0.8,
-)  # prior of ln C: mean and standard deviation (C is 2 on grass, 8 on hard soil)
+# Prior of ln C, mean and standard deviation: C is 2 on grass, 8 on hard soil.
+_STEEPNESS = (float(np.log(5.0)), 0.8)
 _LEVEL = (0.6, 0.6)  # prior of A: mean, and standard deviation of ln A
 _LEAST_PULL = 0.15
 _DELAY = 0.1  # s, SD of the ground speed's delay: while a machine speeds up it pulls more, so a delay would pass for slip

@@ -26,17 +26,14 @@ _DRIVING = 0.1  # m/s
 _LEAST_FREE = 10.0  # s of driving with a bar that nothing moves
 _DEFAULT_PITCH = float(np.radians(0.2))  # prior of a pitch sensor's zero
 _DEFAULT_SLOPE = float(np.radians(0.5))  # prior of the slope where the vehicle states none
-_UNKNOWN_BIAS = (
-    0.3  # m/s^2, prior of an accelerometer's bias where the vehicle states none: mounting included
-)
+# m/s^2, prior of an accelerometer's bias where the vehicle states none: mounting included.
+_UNKNOWN_BIAS = 0.3
 _UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle never stands: .3 deg/s
 _ALIKE = 3.0  # standard errors
 _ALONE = 4.0  # s that one stop must last to count without another that agrees: whoever stands for the zeros stands 10 s
 _ONE_SHORT_STOP = "one short stop, or stops that disagree: stand 10 s with the motors off and the bar slack, or twice with driving between"
-_HOLDING = (
-    0.3,
-    1.5,
-)  # of the weight along the slope: wheels that hold the vehicle carry it, less what the ground's resistance does
+# Of the weight along the slope: wheels that hold the vehicle carry it, less what the ground's resistance does.
+_HOLDING = 0.3, 1.5
 _IDLE_SHARE = 0.05  # of the driving torque: more than that at standstill is work, not a zero
 
 
