@@ -30,7 +30,7 @@ from terragrip.ground.roughness import Roughness, shared
 from terragrip.ground.unknown import CELLS, ROUGHNESSES, UNKNOWN, cells, textures
 from terragrip.soil.blocks import Blocks
 from terragrip.soil.library import Soil
-from terragrip.soil.signature import Signature, curve_error, signature_in
+from terragrip.soil.signature import USUAL_SOIL, Signature, curve_error, signature_in, steepness
 
 _CURVE_SPREAD = 0.10
 """SD of mu about its curve, relative, where a library does not state it."""
@@ -103,11 +103,11 @@ class Emissions:
         return out
 
     def _likelihood(self, blocks: Blocks, weight: Floats) -> Floats:
-        roughness, level = blocks.roughness, broad_level(blocks)
+        roughness, level, usual = blocks.roughness, broad_level(blocks), steepness(USUAL_SOIL, blocks)
         columns = []
         for name, soil in self.soils.items():
             signature = self.signatures[name]
-            mine = weight * mixed(_level(soil, signature, blocks), level)
+            mine = weight * mixed(_level(soil, signature, blocks, usual), level)
             if name not in self.roughness.means:
                 columns.append(mine[:, None] + textures(roughness))
                 continue
@@ -120,13 +120,14 @@ class Emissions:
         return not (self.made_by and signature.made_by) or self.made_by == signature.made_by
 
 
-def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
-    """Log density of rho_s and mu on a known soil, (blocks,)."""
-    error, own, scale, steepness = curve_error(soil, blocks)
+def _level(soil: Soil, signature: Signature | None, blocks: Blocks, usual: Floats) -> Floats:
+    """Log density of rho_s and mu on a known soil, (blocks,); `usual`: steepness of the usual curve."""
+    error, own, scale = curve_error(soil, blocks)
+    steeper = steepness(soil, blocks) / usual
     own = own + _relative_interval(soil) ** 2
     if signature is None:
         mean, sd = soil.resistance or BROAD_RESISTANCE
-        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale) + of_slip(own, _CURVE_SPREAD, steepness)
+        mu = normal(error, _CURVE_SPREAD**2 + own) - np.log(scale) + of_slip(own, _CURVE_SPREAD, steeper)
         return mu + normal(blocks.resistance - mean, sd**2 + blocks.resistance_variance)
     first = np.sqrt(signature.level_sd[0] ** 2 + blocks.resistance_variance)
     second = np.sqrt(signature.level_sd[1] ** 2 + own)
@@ -134,7 +135,7 @@ def _level(soil: Soil, signature: Signature | None, blocks: Blocks) -> Floats:
     correlation = signature.level_correlation
     covariance = np.array([[1.0, correlation], [correlation, 1.0]])
     both = bivariate(np.stack([x, y], axis=-1), covariance) - np.log(first * second * scale)
-    return both + of_slip(own, signature.level_sd[1], steepness)
+    return both + of_slip(own, signature.level_sd[1], steeper)
 
 
 def _relative_interval(soil: Soil) -> float:

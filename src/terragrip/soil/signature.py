@@ -28,6 +28,7 @@ OFFSET = 0.05
 """mu at which the error about the curve is as much additive as proportional."""
 USUAL_CURVE = {"a": 0.85}
 """Of the paper's prototype (eq. 8): what a soil without a curve of its own is compared with."""
+USUAL_SOIL = Soil("usual", "exponential", USUAL_CURVE)
 LEAST_SD = (0.005, 0.03)
 """Below this the ground of one soil does not vary from field to field: of rho_s, and of mu relative to its curve."""
 
@@ -97,34 +98,34 @@ def signature_in(soil: Soil, file: str | os.PathLike[str] | None = None) -> Sign
     return None if data is None else Signature.from_dict(data, f"soils.{soil.name}.signature", file)
 
 
-def curve_error(soil: Soil, blocks: Blocks) -> tuple[Floats, Floats, Floats, Floats]:
-    """Relative error of mu about the soil's curve, its variance according to the estimates, its scale, and the curve's slope over that of
-    the usual curve, (blocks,) each.
+def curve_error(soil: Soil, blocks: Blocks) -> tuple[Floats, Floats, Floats]:
+    """Relative error of mu about the soil's curve, its variance according to the estimates, and its scale, (blocks,) each.
 
     error = mean over wheels, by load, of mu - f(s), over scale = |f(s)| + `OFFSET`. Errors of the wheels are assumed alike; that of slip
-    enters by the curve's slope, up to half the curve's height. The slope is at least the mean one up to the largest slip.
+    enters by the curve's slope, up to half the curve's height.
     """
-    plain = {k: v for k, v in soil.parameters.items() if k != "intercept"}
     curve = soil.value(blocks.slip)
-    slope = np.abs(CURVES[soil.model].slope(blocks.slip, plain))
     scale = np.abs((curve * blocks.share).sum(axis=1)) + OFFSET
     error = ((blocks.adhesion - curve) * blocks.share).sum(axis=1) / scale
-    height = np.abs(soil.value(np.array([LARGEST_SLIP])))
-    known = np.hypot(
-        np.sqrt(blocks.adhesion_variance), np.minimum(slope * np.sqrt(blocks.slip_variance), 0.5 * height)
+    by_slip = np.minimum(_slope(soil, blocks) * np.sqrt(blocks.slip_variance), 0.5 * _height(soil))
+    known = np.hypot(np.sqrt(blocks.adhesion_variance), by_slip)
+    return error, ((known * blocks.share).sum(axis=1) / scale) ** 2, scale
+
+
+def steepness(soil: Soil, blocks: Blocks) -> Floats:
+    """Slope of the soil's curve at the wheels' slips, their mean by load, (blocks,); at least the mean slope up to the largest slip."""
+    return np.asarray(
+        (np.maximum(_slope(soil, blocks), _height(soil) / LARGEST_SLIP) * blocks.share).sum(axis=1)
     )
-    own = ((known * blocks.share).sum(axis=1) / scale) ** 2
-    return error, own, scale, _steepness(slope, height, blocks) / _usual_steepness(blocks)
 
 
-def _usual_steepness(blocks: Blocks) -> Floats:
-    curve = CURVES["exponential"]
-    height = curve.value(np.array([LARGEST_SLIP]), USUAL_CURVE)
-    return _steepness(np.abs(curve.slope(blocks.slip, USUAL_CURVE)), height, blocks)
+def _slope(soil: Soil, blocks: Blocks) -> Floats:
+    plain = {k: v for k, v in soil.parameters.items() if k != "intercept"}
+    return np.abs(CURVES[soil.model].slope(blocks.slip, plain))
 
 
-def _steepness(slope: Floats, height: Floats, blocks: Blocks) -> Floats:
-    return np.asarray((np.maximum(slope, height / LARGEST_SLIP) * blocks.share).sum(axis=1))
+def _height(soil: Soil) -> float:
+    return float(np.abs(soil.value(np.array([LARGEST_SLIP])))[0])
 
 
 def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Signature | None:
@@ -135,7 +136,7 @@ def learn_signature(soil: Soil, runs: Sequence[Blocks], made_by: str = "") -> Si
     levels, noises, roughness = [], [], []
     for run in runs:
         known = run.known
-        error, noise, *_ = curve_error(soil, run)
+        error, noise, _ = curve_error(soil, run)
         levels.append(np.where(known[:, None], np.column_stack([run.resistance, error]), np.nan))
         noises.append(np.column_stack([run.resistance_variance, noise]))
         rough = np.isfinite(run.roughness).all(axis=1) & known
