@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -34,12 +33,15 @@ class Extra:
 
     @classmethod
     def of(cls, estimates: Path, log: str, *, maps: bool, ground: bool) -> Extra:
-        """The optional results of a file of estimates, those that are wanted."""
+        """The optional results of a file of estimates, those that are wanted; it is read once. Raises InputError as `Estimates.read`."""
         tables: dict[str, pa.Table] = {}
         no_map = no_ground = ""
+        if not (maps or ground):
+            return cls(tables)
+        whole = Estimates.read(estimates)
         if maps:
             try:
-                cells = cells_of_log(estimates, log)
+                cells = cells_of_log(whole, log)
             except InputError as error:
                 no_map = str(error)
             else:
@@ -47,14 +49,14 @@ class Extra:
                 tables |= {} if cells is None else {"cells": cells}
         if ground:
             try:
-                tables |= ground_of_log(estimates, log)
+                tables |= ground_of_log(whole, log)
             except InputError as error:
                 no_ground = str(error)
         return cls(tables, no_map, no_ground)
 
 
-def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
-    """The map cells of a file of estimates (docs/maps.md); None if it has no positions.
+def cells_of_log(estimates: Estimates, log: str) -> pa.Table | None:
+    """The map cells of a log's estimates (docs/maps.md); None if it has no positions.
 
     Columns: ``log``, ``epsg`` of the grid, ``cell`` [m], ``east`` and ``north`` of the cell's centre [m], and those of
     `terragrip.maps.layers.cell_table`. Raises InputError if the positions contradict the motion.
@@ -65,7 +67,6 @@ def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
     from terragrip.maps.layers import cell_table
     from terragrip.maps.places import has_positions
 
-    estimates = Estimates.read(path)
     if not has_positions(estimates):
         return None
     maker = MapMaker()
@@ -84,8 +85,8 @@ def cells_of_log(path: str | os.PathLike[str], log: str) -> pa.Table | None:
     return pa.table({name: pa.array(values, from_pandas=True) for name, values in {**where, **table}.items()})
 
 
-def ground_of_log(path: str | os.PathLike[str], log: str) -> dict[str, pa.Table]:
-    """The ``sections`` and ``events`` of a file of estimates, as `terragrip ground` finds them without a soil library.
+def ground_of_log(estimates: Estimates, log: str) -> dict[str, pa.Table]:
+    """The ``sections`` and ``events`` of a log's estimates, as `terragrip ground` finds them without a soil library.
 
     A row holds the ``log``, the fields of a `terragrip.ground.sections.Section` or `terragrip.ground.events.Event` except those by wheel
     or soil, and its duration ``seconds``. Without sections or events that table is missing. Raises InputError if the estimates do not
@@ -93,7 +94,7 @@ def ground_of_log(path: str | os.PathLike[str], log: str) -> dict[str, pa.Table]
     """
     from terragrip.ground.analysis import analyse
 
-    ground, _ = analyse(Estimates.read(path), run=log)
+    ground, _ = analyse(estimates, run=log)
     tables = {"sections": _table(ground.sections, log), "events": _table(ground.events, log)}
     return {name: table for name, table in tables.items() if table is not None}
 
