@@ -61,6 +61,12 @@ def written(estimates: Estimates, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     return write
 
 
+def test_export_is_the_same_command(written: Any, tmp_path: Path) -> None:
+    converted = written(".csv").read_bytes()
+    assert main(["export", str(tmp_path / "e.parquet"), "-o", str(tmp_path / "again.csv"), "-q"]) == 0
+    assert (tmp_path / "again.csv").read_bytes() == converted
+
+
 def same(found: Any, estimates: Estimates, rows: Any = slice(None), rtol: float = 0) -> None:
     """Columns read back are the estimates', digit by digit, or as near as ``rtol``."""
     for name in estimates:

@@ -48,6 +48,7 @@ app.add_typer(new, name="new")
 app.command("inspect")(inspect)
 app.command("estimate")(estimate)
 app.command("convert")(convert)
+app.command("export", hidden=True)(convert)  # the contract's other name of it
 app.command("calibrate")(calibrate)
 app.command("soils")(soils)
 app.command("ground")(ground)
