@@ -110,66 +110,72 @@ def _of_soil(
     refuted = known is not None and known.fit.get("follows") is False
     own = of_drives(samples, vehicle) if known is None or refuted else None
     curves = of_library(known, samples, vehicle) if known is not None and own is None else own
-    if curves is None:
-        return Advice(
-            name, drive=drive,
-            missing=(f"{samples.way:.0f} m of usable way are too short for a curve: drive 50 wheel radii or more on it",),
-        )  # fmt: skip
-    if curves.reach < LEAST_REACH:
-        return Advice(
-            name, drive=drive,
-            missing=(
-                f"the hardest pulls slip by {curves.reach:.1%} on average, too little for a curve: pull until slip is 5 to 10 %, "
-                "on level ground "
-                "and at several loads",
-            ),
-        )  # fmt: skip
+    if curves is None or curves.reach < LEAST_REACH:
+        return Advice(name, drive=drive, missing=(_too_little(curves, samples.way),))
     over = curves.over
-    best = best_of(over, over.efficiency)
-    power = best_of(over, over.productivity)
-    whose = "the drive" if own is not None else "the library"
-    missing = _missing(
-        best, power, curves, vehicle, whose, measured="litres_per_hour" in _burnt(loaded, vehicle)
-    )
-    beyond = own is None and power.slip > curves.reach
-    if drive["soil_resistance"] < 0:
-        missing.insert(
-            0,
-            f"soil resistance is {drive['soil_resistance']:.3f} in the mean, and no ground pushes: the torques' scale, the drawbar's "
-            "zero or a slope is off, and every efficiency here is too high; calibrate, and drive the same way back too",
-        )
-    works = samples.towed and drive["net_traction"] >= LEAST_PULL
-    if not works:
-        missing.insert(0, NO_LOAD if samples.towed else NO_PULL)
-    if beyond:
-        missing.append(
-            f"the library's curve was learned at slips up to {curves.reach:.0%}: a slip of most pull power beyond them depends on the "
-            "form of the curve alone; learn it from drives with harder pulls"
-        )
-    if soils and own is not None:
-        lacking = (
-            f"the library's {known.model} form cannot follow the drives that it was learned from"
-            if known is not None
-            else f"the library has no soil named {name!r}"
-            if name
-            else "the rows name no soil, and the library has several"
-        )
-        missing.append(f"{lacking}: the curve is learned from these estimates")
-    given = _known(best, over)
-    if not given:
-        return Advice(name, missing=tuple(missing), drive=drive, reserve=_reserve(loaded, curves, wheels))
-    slip, pull = loaded.levels()
+    best, power = best_of(over, over.efficiency), best_of(over, over.productivity)
     fuel = _burnt(loaded, vehicle)
+    works = samples.towed and drive["net_traction"] >= LEAST_PULL
+    beyond = own is None and power.slip > curves.reach
+    missing: tuple[str, ...] = () if works else (NO_LOAD if samples.towed else NO_PULL,)
+    missing += _pushed(drive["soil_resistance"])
+    whose = "the drive" if own is not None else "the library"
+    missing += _missing(best, power, curves, vehicle, whose, measured="litres_per_hour" in fuel)
+    if beyond:
+        missing += (_beyond(curves.reach),)
+    if soils and own is not None:
+        missing += (_not_of_library(name, known),)
+    if not _known(best, over):
+        return Advice(name, missing=missing, drive=drive, reserve=_reserve(loaded, curves, wheels))
+    slip, pull = loaded.levels()
     work = Work(over, best, slip, pull, drive["ground_speed"], drive["soil_resistance"])
     advice = Advice(
         name, best,
         power if power.interval[1] - power.interval[0] <= WIDEST_POWER and not beyond else None,
         _front(over, best, power),
-        tuple(actions_for(work, vehicle)), tuple(missing), {**drive, "efficiency": float(work.efficiency[0])},
+        tuple(actions_for(work, vehicle)), missing, {**drive, "efficiency": float(work.efficiency[0])},
         _reserve(loaded, curves, wheels), {**_field_work(work, vehicle), **fuel},
         (*_limits(work, drive), *_left_out(samples.way - loaded.way, samples.way)), _curve(over),
     )  # fmt: skip
     return advice if works else replace(advice, actions=(), drive=drive, field_work=fuel, limits=())
+
+
+def _too_little(curves: SoilCurves | None, way: float) -> str:
+    """Why a drive bears no advice."""
+    if curves is None:
+        return f"{way:.0f} m of usable way are too short for a curve: drive 50 wheel radii or more on it"
+    return (
+        f"the hardest pulls slip by {curves.reach:.1%} on average, too little for a curve: pull until slip is 5 to 10 %, "
+        "on level ground and at several loads"
+    )
+
+
+def _pushed(resistance: float) -> tuple[str, ...]:
+    """That the ground pushes, where it seems to."""
+    if resistance >= 0:
+        return ()
+    return (
+        f"soil resistance is {resistance:.3f} in the mean, and no ground pushes: the torques' scale, the drawbar's "
+        "zero or a slope is off, and every efficiency here is too high; calibrate, and drive the same way back too",
+    )
+
+
+def _beyond(reach: float) -> str:
+    return (
+        f"the library's curve was learned at slips up to {reach:.0%}: a slip of most pull power beyond them depends on the "
+        "form of the curve alone; learn it from drives with harder pulls"
+    )
+
+
+def _not_of_library(name: str, known: Soil | None) -> str:
+    """Why the library's soil is not used; ``known``: the one of that name."""
+    if known is not None:
+        why = f"the library's {known.model} form cannot follow the drives that it was learned from"
+    elif name:
+        why = f"the library has no soil named {name!r}"
+    else:
+        why = "the rows name no soil, and the library has several"
+    return f"{why}: the curve is learned from these estimates"
 
 
 def _known(best: Best, over: OverSlip) -> bool:
@@ -179,7 +185,7 @@ def _known(best: Best, over: OverSlip) -> bool:
 
 def _missing(
     best: Best, power: Best, curves: SoilCurves, vehicle: Vehicle, whose: str, *, measured: bool
-) -> list[str]:
+) -> tuple[str, ...]:
     """What is not known and what would show it; ``whose`` slips the curves' data are; ``measured``: the fuel was."""
     missing = []
     low, high = best.interval
@@ -211,7 +217,7 @@ def _missing(
     ):
         if getattr(vehicle, key) is None and not (key == "fuel" and measured):
             missing.append(f"{key} in the vehicle file, for {unit}")
-    return missing
+    return tuple(missing)
 
 
 def _drive(samples: Samples) -> dict[str, float]:

@@ -14,6 +14,7 @@ from terragrip.cli.progress import progress
 from terragrip.note_pages import with_page
 
 if TYPE_CHECKING:
+    from terragrip.soil.fit import AdhesionCurve
     from terragrip.soil.library import Soil, SoilLibrary
 
 
@@ -78,9 +79,7 @@ def command(
     depends on weak and strong spots; the paper's fit, sorted by slip, is given beside it.
     """
     from terragrip.errors import InputError
-    from terragrip.soil.bins import BY_SLIP, BinSettings, chosen_bins
-    from terragrip.soil.digitised import soils_of_points
-    from terragrip.soil.estimates import soils_of
+    from terragrip.soil.bins import BY_SLIP, chosen_bins
     from terragrip.soil.fit import FREE, AdhesionCurve
     from terragrip.soil.library import SoilLibrary
     from terragrip.soil.literature import literature_soils
@@ -96,50 +95,65 @@ def command(
             str(error), place="--width, --lower, --upper, --by, --metres, --runs", hint="choose other bins"
         ) from None
     curve = AdhesionCurve(model, FREE if free else None, weights="count" if weights else None, bins=bins)
-    usual = chosen_bins(by)
-    special: dict[str, BinSettings] | None = (
-        None if (bins.width, bins.lower, bins.upper) == (usual.width, usual.lower, usual.upper) else {}
-    )
-    estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
     if soil is not None and all(path.suffix.lower() == ".json" for path in inputs):
         raise InputError(
             "names the soil of rows or points, but only libraries are given",
             place="--soil",
             hint="leave it out",
         )
-    library = SoilLibrary({})
-    words: list[str] = []
-    estimates, left = _with_adhesion(estimates)
-    words += [f"{path}: left out, it has slip without adhesion." for path in left]
-    if estimates:
-        with progress("soils", quiet) as step:
-            campaign = soils_of(estimates, curve, special, soil, step)
-        library = campaign.library({"files": [str(path) for path in estimates]})
-        words += campaign.words
+    estimates = [path for path in inputs if path.suffix.lower() not in (".json", ".csv")]
+    library, words = _learned(estimates, curve, soil, quiet)
     for path in inputs:
         if path.suffix.lower() == ".json":
             library = _joined(library, SoilLibrary.load(path), path)
         elif path.suffix.lower() == ".csv":
-            points = soils_of_points(path, curve.unfitted(bins=of_points), soil)
-            words += [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
-            words += [
-                f"{name}: {with_page(note)}"
-                for name, one in points.items()
-                for note in one.fit.get("notes", ())
-            ]
+            points, of_file = _digitised(path, curve.unfitted(bins=of_points), soil)
             library = _joined(library, points, path)
+            words += of_file
     if base is not None:
         library = base.merge(library, "replace")
     if literature:
         library = library.merge(literature_soils(), "keep")
     library.write(target)
-    if not quiet:
-        print(table(library))
-        for sentence in words:
-            print(sentence)
-        if other is not None:
-            print(comparison(library, other, compare))
-        print(f"Written to {output}")
+    if quiet:
+        return
+    print(table(library))
+    for sentence in words:
+        print(sentence)
+    if other is not None:
+        print(comparison(library, other, compare))
+    print(f"Written to {output}")
+
+
+def _learned(
+    estimates: list[Path], curve: AdhesionCurve, soil: str | None, quiet: bool
+) -> tuple[SoilLibrary, list[str]]:
+    """The soils of estimates, and what is to be said of them."""
+    from terragrip.soil.bins import chosen_bins
+    from terragrip.soil.estimates import soils_of
+    from terragrip.soil.library import SoilLibrary
+
+    learning, left = _with_adhesion(estimates)
+    words = [f"{path}: left out, it has slip without adhesion." for path in left]
+    if not learning:
+        return SoilLibrary({}), words
+    bins, usual = curve.bins, chosen_bins(curve.bins.by)
+    as_usual = (bins.width, bins.lower, bins.upper) == (usual.width, usual.lower, usual.upper)
+    with progress("soils", quiet) as step:
+        campaign = soils_of(learning, curve, None if as_usual else {}, soil, step)
+    return campaign.library({"files": [str(path) for path in learning]}), [*words, *campaign.words]
+
+
+def _digitised(path: Path, curve: AdhesionCurve, soil: str | None) -> tuple[SoilLibrary, list[str]]:
+    """The soils of a file of digitised points, and what is to be said of them."""
+    from terragrip.soil.digitised import soils_of_points
+
+    points = soils_of_points(path, curve, soil)
+    words = [f"{name}: not fitted, {why}." for name, why in points.not_fitted.items()]
+    words += [
+        f"{name}: {with_page(note)}" for name, one in points.items() for note in one.fit.get("notes", ())
+    ]
+    return points, words
 
 
 def _with_adhesion(estimates: list[Path]) -> tuple[list[Path], list[Path]]:

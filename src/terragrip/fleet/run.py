@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -97,22 +97,12 @@ def run_fleet(
     settings = Settings(
         method, smooth, tuple(str(path.absolute()) for path in dbc), __version__, maps, ground
     )
-    outcomes: list[Outcome] = []
     emit(logger, "fleet_started", logs=len(logs))
     try:
         # A call without workers leaves no folder behind.
         with workers_at(scheduler, workers or default_workers(), memory) as pool, store.locked():
             before, failed = known_notes(store, [log.name for log in logs])
-            stopped: InputError | None = None
-            try:
-                for outcome in pool.run(logs, settings, store, failed):
-                    outcomes.append(outcome)
-                    if outcome.note is None:
-                        emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
-                    if progress:
-                        progress(len(outcomes), len(logs) + 1)
-            except InputError as error:  # the workers are gone; still write the tables of what is done
-                stopped = error
+            outcomes, stopped = _outcomes(pool.run(logs, settings, store, failed), len(logs), progress)
             notes, reasons = settled(store, before, failed, outcomes)
             notes = compared(notes)
             _write(store, notes, reasons)
@@ -122,9 +112,33 @@ def run_fleet(
         raise InputError(
             f"cannot be read or written ({error})", file=output, hint="run again; finished logs are kept"
         ) from error
+    result = _result(outcomes, notes, reasons)
+    counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
+    emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)
+    return result
+
+
+def _outcomes(
+    coming: Iterable[Outcome], logs: int, progress: Callable[[int, int], None] | None
+) -> tuple[list[Outcome], InputError | None]:
+    """The outcomes as they come; and, where the workers are lost, the error, so that the tables of what is done are still written."""
+    outcomes: list[Outcome] = []
+    try:
+        for outcome in coming:
+            outcomes.append(outcome)
+            if outcome.note is None:
+                emit(logger, "fleet_log_failed", log=outcome.log, reason=outcome.reason)
+            if progress:
+                progress(len(outcomes), logs + 1)
+    except InputError as error:
+        return outcomes, error
+    return outcomes, None
+
+
+def _result(outcomes: Sequence[Outcome], notes: Sequence[Note], reasons: Mapping[str, str]) -> FleetResult:
     named = {one.log for one in outcomes}
     fresh = [one.note["summary"] for one in outcomes if one.fresh and one.note is not None]
-    result = FleetResult(
+    return FleetResult(
         estimated=sum(one.fresh for one in outcomes),
         unchanged=sum(one.note is not None and not one.fresh for one in outcomes),
         failed={one.log: reasons[one.log] for one in outcomes if one.note is None},
@@ -138,9 +152,6 @@ def run_fleet(
         left_out={note["log"]: why for note in notes if (why := note["summary"]["left_out"])},
         unlike=unlike([note["summary"] for note in notes]),
     )
-    counts = {"estimated": result.estimated, "unchanged": result.unchanged, "failed": len(result.failed)}
-    emit(logger, "fleet_ended", **counts, kept=result.kept, rows=result.rows, restarts=result.restarts)
-    return result
 
 
 def _write(store: Store, notes: Sequence[Note], reasons: Mapping[str, str]) -> None:
