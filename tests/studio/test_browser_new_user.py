@@ -199,6 +199,32 @@ def test_a_columns_choice_unit_and_sign_reach_the_profile(
     assert "pitch" not in channels
 
 
+def test_a_scale_that_only_the_user_knows_is_asked_for_and_the_choice_is_that_of_the_profile(
+    page: Any, served: Served, folder: Path, foreign: Path
+) -> None:
+    """A motor current was taken for N m, times 1, and "2,5" in a field for numbers for 25."""
+    import yaml
+
+    log = pd.read_csv(foreign, nrows=2000).rename(columns=lambda name: name.replace("Torque", "Current"))
+    log.rename(columns=lambda name: name.replace("[Nm]", "[A]")).to_csv(folder / "day2.csv", index=False)
+    page.goto(f"{served.url}/#/start?log=day2.csv")
+    page.wait_for_selector("#column-ground_speed")
+    page.click("#use-columns")
+    assert page.evaluate("() => document.activeElement.ariaLabel") == "Scale of drive_torque_fl"
+    for wheel in WHEELS:
+        page.fill(f"[aria-label='Scale of drive_torque_{wheel}']", "2,5")
+    page.click("#use-columns")
+    page.wait_for_selector("#wizard-profile option[value='day2-profile.yaml']", state="attached")
+    (kept,) = folder.glob("*-profile.yaml")
+    profile = yaml.safe_load(kept.read_text())
+    assert profile["channels"]["drive_torque_rr"]["scale"] == 2.5
+    profile["channels"]["drive_torque_rr"]["scale"] = 3
+    (folder / "other.yaml").write_text(yaml.safe_dump(profile))
+    page.wait_for_selector("#wizard-profile option[value='other.yaml']", state="attached")
+    page.select_option("#wizard-profile", "other.yaml")
+    page.wait_for_selector("[aria-label='Scale of drive_torque_rr'][value='3']", state="attached")
+
+
 def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(
     page: Any, served: Served, folder: Path, made: Path
 ) -> None:

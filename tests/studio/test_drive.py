@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -273,6 +274,17 @@ def test_ground_of_the_run_is_shown_where_it_lies_beside_it(client: TestClient, 
     }
     (folder / "estimates-ground.json").write_text(json.dumps(ground))
     assert client.get("/api/drive", params={"path": RUN}).json()["ground"]["sections"] == ground["sections"]
+
+
+def test_the_ground_that_a_logs_page_finds_is_that_of_its_run(client: TestClient, folder: Path) -> None:
+    """It is named after the log, not after the estimates: no page showed it."""
+    for name, soil in (("day1-ground", "wet"), ("day1-ground-2", "grass")):
+        one = {"run": "estimates", "start": 0, "end": 9, "soil": soil, "probabilities": {soil: 1.0}}
+        (folder / f"{name}.json").write_text(json.dumps({"changes": [], "sections": [one]}))
+        os.utime(folder / f"{name}.json", (soil == "grass", soil == "grass"))
+    other = {"changes": [], "sections": [one | {"run": "day2"}]}
+    (folder / "day2-ground.json").write_text(json.dumps(other))
+    assert client.get("/api/drive", params={"path": RUN}).json()["ground"]["sections"] == [one]
 
 
 def test_a_ground_file_of_several_runs_gives_this_runs_sections(client: TestClient, folder: Path) -> None:

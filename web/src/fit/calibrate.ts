@@ -1,6 +1,7 @@
 /** The dialog in which a picture's axes are calibrated: two points an axis, by click, drag or number. */
 
 import { fill, h } from "../ui/dom";
+import { numberField } from "../ui/number";
 import { mapOf, slipDoubt, type Axis, type Calibration, type Mark, type Pixel } from "./picture";
 
 type AxisName = "slip" | "adhesion";
@@ -228,9 +229,8 @@ class Editor {
         this.drawSide();
       };
       const field = (label: string, value: number | undefined, put: (mark: Mark, v: number) => void): HTMLElement => {
-        const input = h("input", { type: "number", step: "any", "aria-label": `${TITLE[axis]}, point ${i + 1}, ${label}`, value: value === undefined ? "" : Number(value.toFixed(label === "value" ? 5 : 1)) });
-        input.addEventListener("change", () => Number.isFinite(input.valueAsNumber) && set((m) => put(m, input.valueAsNumber)));
-        return h("td", {}, input);
+        const shown = value === undefined ? "" : Number(value.toFixed(label === "value" ? 5 : 1));
+        return h("td", {}, numberField({ "aria-label": `${TITLE[axis]}, point ${i + 1}, ${label}`, value: shown }, (v) => Number.isFinite(v) && set((m) => put(m, v))));
       };
       return h(
         "tr",

@@ -1,6 +1,7 @@
 /** The panel on the right: the active curve's model, a slider and a number field for each parameter, its fit. */
 
 import { digits, fill, h } from "../ui/dom";
+import { numberField, numberOf } from "../ui/number";
 import { unitFor, withUnit } from "../ui/units";
 import { farthest } from "./samples";
 import { sameCurve } from "./scene";
@@ -171,7 +172,14 @@ export class CurvesPanel {
       id: `slider-${name}`,
       "aria-label": `${name}: ${parameter.meaning}`,
     });
-    const field = h("input", { type: "number", step: "any", id: `field-${name}`, "aria-label": `${name}, exact` });
+    const field = numberField({ id: `field-${name}`, "aria-label": `${name}, exact`, required: true, least: parameter.lower, most: parameter.upper }, (typed) => {
+      curve.parameters[name] = typed;
+      slider.min = String(Math.min(low, typed));
+      slider.max = String(Math.max(high, typed));
+      slider.value = String(typed);
+      this.state.changed("curve");
+      this.settle();
+    });
     slider.value = String(now);
     field.value = digits(now, 5);
     slider.addEventListener("input", () => {
@@ -180,21 +188,6 @@ export class CurvesPanel {
       this.state.changed("curve");
     });
     slider.addEventListener("change", () => this.settle());
-    field.addEventListener("change", () => {
-      const typed = field.valueAsNumber;
-      if (!Number.isFinite(typed) || typed < parameter.lower || typed > parameter.upper) {
-        field.setCustomValidity(`between ${parameter.lower} and ${parameter.upper}`);
-        field.reportValidity();
-        return;
-      }
-      field.setCustomValidity("");
-      curve.parameters[name] = typed;
-      slider.min = String(Math.min(low, typed));
-      slider.max = String(Math.max(high, typed));
-      slider.value = String(typed);
-      this.state.changed("curve");
-      this.settle();
-    });
     this.rows.set(name, { slider, field, parameter });
     const hold = h("input", { type: "checkbox", id: `hold-${name}`, checked: curve.held.includes(name), "aria-label": `hold ${name}: neither a drag nor a fit changes it`, title: "hold: neither a drag nor a fit changes it" });
     hold.addEventListener("change", () => {
@@ -218,13 +211,12 @@ export class CurvesPanel {
     const { name, lower, upper } = parameter;
     const ends = [lower, upper].map((own, i) => {
       const now = curve.bounds[name]?.[i];
-      const field = h("input", { type: "number", step: "any", id: `${i ? "upper" : "lower"}-${name}`, placeholder: digits(own, 3), "aria-label": `${name}, ${i ? "largest" : "smallest"} value of a fit` });
-      field.value = now === undefined || now === own ? "" : digits(now, 5);
-      field.addEventListener("change", () => set());
-      return field;
+      const value = now === undefined || now === own ? "" : digits(now, 5);
+      return numberField({ id: `${i ? "upper" : "lower"}-${name}`, placeholder: digits(own, 3), value, "aria-label": `${name}, ${i ? "largest" : "smallest"} value of a fit` }, () => set());
     });
     const set = (): void => {
-      const typed = ends.map((field) => field.valueAsNumber);
+      if (ends.some((field) => field.value.trim() && Number.isNaN(numberOf(field.value)))) return; // refused as it was typed
+      const typed = ends.map((field) => numberOf(field.value));
       const [from, to] = [Number.isFinite(typed[0]) ? (typed[0] as number) : lower, Number.isFinite(typed[1]) ? (typed[1] as number) : upper];
       const right = lower <= from && from < to && to <= upper;
       const asked = ends.find((field) => field === document.activeElement) ?? (ends[0] as HTMLInputElement);

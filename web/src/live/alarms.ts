@@ -1,6 +1,7 @@
 /** Thresholds that ring: slip and grip over a limit, a warning, a source that falls silent. Set once in a browser. */
 
 import { digits, fill, h } from "../ui/dom";
+import { numberField } from "../ui/number";
 import { fixed, onUnits, unitFor, withUnit } from "../ui/units";
 import { WARNING, type Reading } from "./numbers";
 
@@ -105,9 +106,9 @@ export class Alarms {
     const unit = unitFor("share");
     const shown = unit.scale / 100;
     const limit = (name: "slip" | "grip", label: string): HTMLElement => {
-      const field = h("input", { type: "number", id: `alarm-${name}`, min: 0, max: 1000 * shown, step: "any", value: this.set[name] === null ? "" : digits(this.set[name] * shown, 6) });
-      field.addEventListener("change", () => {
-        this.set[name] = Number.isFinite(field.valueAsNumber) ? field.valueAsNumber / shown : null;
+      const value = this.set[name] === null ? "" : digits(this.set[name] * shown, 6);
+      const field = numberField({ id: `alarm-${name}`, least: 0, most: 1000 * shown, value }, (typed) => {
+        this.set[name] = Number.isFinite(typed) ? typed / shown : null;
         this.keep();
       });
       return h("label", { class: "field" }, `${label} [${unit.name}]`, field);

@@ -1,6 +1,7 @@
 /** Where a picture lies on the map: from its file, or typed by the user. */
 
 import { h } from "../ui/dom";
+import { numberField, numberOf } from "../ui/number";
 
 export type Corners = [[number, number], [number, number], [number, number], [number, number]];
 
@@ -18,7 +19,7 @@ interface Bounds {
 /** Ask for the edges of a picture without coordinates; null where the user cancels. */
 export function corners(name: string, bounds: Bounds, before: Corners | null = null): Promise<Corners | null> {
   return new Promise((resolve) => {
-    const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", step: "any", id: `edge-${label}`, value: value.toFixed(6), required: true });
+    const field = (label: string, value: number): HTMLInputElement => numberField({ id: `edge-${label}`, value: value.toFixed(6), required: true });
     const fields = { north: field("north", before?.[0][1] ?? bounds.getNorth()), south: field("south", before?.[2][1] ?? bounds.getSouth()), west: field("west", before?.[0][0] ?? bounds.getWest()), east: field("east", before?.[1][0] ?? bounds.getEast()) };
     const dialog = h("dialog", { class: "wizard", "aria-labelledby": "edges" });
     const form = h(
@@ -36,7 +37,7 @@ export function corners(name: string, bounds: Bounds, before: Corners | null = n
     };
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      const [n, s, w, e] = [fields.north, fields.south, fields.west, fields.east].map((input) => input.valueAsNumber) as [number, number, number, number];
+      const [n, s, w, e] = [fields.north, fields.south, fields.west, fields.east].map((input) => numberOf(input.value)) as [number, number, number, number];
       end([[w, n], [e, n], [e, s], [w, s]]);
     });
     dialog.addEventListener("cancel", () => end(null));

@@ -3,6 +3,8 @@
 import { send, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
+import { numberField, numberOf } from "../ui/number";
+import { row } from "./fields";
 import { freeName, stemOf } from "./jobs";
 
 type Ask = "vehicle" | "profile" | "library" | "ground" | "soil" | "title" | "smooth" | "cell" | "slip" | "datum";
@@ -33,7 +35,7 @@ export const ACTIONS: Record<string, [string, string][]> = {
 };
 
 /** The value for the server in place of the typed one, where they differ. */
-const SENT: Partial<Record<Ask, (text: string) => unknown>> = { slip: (text) => Number(text) / 100, cell: Number };
+const SENT: Partial<Record<Ask, (text: string) => unknown>> = { slip: (text) => numberOf(text) / 100, cell: numberOf };
 
 /** Ask the user for what a command over `files` needs, and queue it; `queued` is called with its job. */
 export function ask(dialog: HTMLDialogElement, name: string, files: string[], items: Item[], queued: (job: Job) => void = () => {}): void {
@@ -51,14 +53,14 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
     fields.set(kind, field);
     return row(NAMES[kind], field);
   };
-  const number = (kind: Ask, range: Record<string, string>, placeholder: string): HTMLElement => {
-    const field = h("input", { type: "number", id: `job-${kind}`, placeholder, ...range });
+  const number = (kind: Ask, least: number, most: number, placeholder: string): HTMLElement => {
+    const field = numberField({ id: `job-${kind}`, placeholder, least, most });
     fields.set(kind, field);
     return row(NAMES[kind], field);
   };
   const forms: Record<Ask, () => HTMLElement> = {
-    cell: () => number("cell", { min: "0.05", max: "1000", step: "any" }, "by the machine's mass: 1 m, above a tonne 3 m"),
-    slip: () => number("slip", { min: "2", max: "90", step: "any" }, "20: the slip at which adhesion is given"),
+    cell: () => number("cell", 0.05, 1000, "by the machine's mass: 1 m, above a tonne 3 m"),
+    slip: () => number("slip", 2, 90, "20: the slip at which adhesion is given"),
     datum: () => text("datum", "", "EPSG:4326 (WGS 84), what GNSS receivers give"),
     vehicle: () => select("vehicle", of("vehicle").length > 1 ? "choose one" : ""),
     profile: () => select("profile", "none: the columns have Terragrip's names"),
@@ -110,8 +112,4 @@ const NO_SOILS: Record<string, string> = { report: "none: curves are learned fro
 function proposed(command: Command, files: string[]): string {
   const one = files.length === 1 ? `${stemOf(files[0] as string).replace(/-estimates$/, "")}-` : "";
   return { batch: "estimates", calibrate: "calibrated-vehicle", soils: `${one}soils`, ground: `${one}ground`, map: `${one}map`, report: `${one}report` }[command.kind] as string;
-}
-
-function row(label: string, field: HTMLElement): HTMLElement {
-  return h("div", { class: "field" }, h("label", { for: field.id }, label), field);
 }

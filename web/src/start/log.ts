@@ -7,6 +7,7 @@ import { tried } from "../ui/notes";
 import { oneAtATime, type Context } from "../ui/page";
 import { onceReleased } from "../ui/press";
 import { bind, boundTo } from "./bound";
+import { choice, reoffer, row } from "./fields";
 import { focusOn, refill } from "./focus";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
@@ -88,8 +89,9 @@ export class LogPage {
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement | null;
     const found = document.getElementById("wizard-found");
     if (!select || !found) return; // still opening
-    const vehicles = this.of("vehicle");
-    if (vehicles.join("\n") !== [...select.options].map((one) => one.value).filter(Boolean).join("\n")) fill(select, offered(vehicles, this.vehicle, "choose the log's vehicle"));
+    reoffer(select, this.of("vehicle"), this.vehicle, "choose the log's vehicle");
+    const profile = document.getElementById("wizard-profile") as HTMLSelectElement | null;
+    if (profile) reoffer(profile, this.profiles, this.profile, profile.options[0]?.text ?? "");
     if (this.version(this.vehicle, this.profile) !== this.read[1]) await this.inspect();
     if (this.version(this.log) === this.read[0] || document.getElementById("read-again")) return;
     found.prepend(h("p", { class: "bad", role: "alert" }, "The log has changed since it was read. ", h("button", { type: "button", id: "read-again", click: () => void this.open() }, "Read it again")));
@@ -128,11 +130,12 @@ export class LogPage {
     await this.inspect();
   }
 
-  /** Leave the saved profile, which stays, for what is proposed. */
-  private async propose(): Promise<void> {
-    [this.profile, this.left] = ["", ""];
-    this.look = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"));
-    this.drawColumns(true);
+  /** Read the log by another profile, or ("") by none, with what is proposed: the profile before stays in the folder. */
+  private async readBy(profile: string): Promise<void> {
+    [this.profile, this.left] = [profile, ""];
+    bind(this.key, { profile });
+    this.look = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), profile);
+    this.drawColumns(profile ? (document.getElementById("choose-columns") as HTMLDetailsElement | null)?.open ?? false : true);
     await this.inspect();
   }
 
@@ -146,6 +149,10 @@ export class LogPage {
   private async parts(): Promise<void> {
     const parts = this.vehicle ? await tried(() => get<Parts>("machines/parts", { path: this.vehicle })) : undefined;
     this.mapping?.names.offer(parts ?? { wheels: [], axles: [] });
+  }
+
+  private get profiles(): string[] {
+    return [...new Set([...this.of("profile"), ...(this.look?.fitting ?? [])])];
   }
 
   private of(kind: string): string[] {
@@ -164,13 +171,9 @@ export class LogPage {
       return;
     }
     const none = this.look.ready ? "no profile: the columns have Terragrip's names" : "no profile yet: choose the columns below";
-    const profile = choice("wizard-profile", [...new Set([...this.of("profile"), ...this.look.fitting])], this.profile, none);
-    profile.addEventListener("change", () => {
-      this.profile = profile.value;
-      bind(this.key, { profile: this.profile });
-      void this.inspect();
-    });
-    const back = this.profile ? h("button", { type: "button", id: "propose", click: () => void this.propose() }, "Back to the proposals") : null;
+    const profile = choice("wizard-profile", this.profiles, this.profile, none);
+    profile.addEventListener("change", () => void this.readBy(profile.value));
+    const back = this.profile ? h("button", { type: "button", id: "propose", click: () => void this.readBy("") }, "Back to the proposals") : null;
     refill(this.columns, [
       this.left ? h("p", { class: "hint", id: "as-left" }, `As you left it: ${this.left}. `, back) : null,
       row("Read by", profile),
@@ -342,7 +345,7 @@ export class LogPage {
     const runs = { estimates: [this.estimates] };
     const button = (kind: string, text: string, work: () => void): HTMLElement => {
       const path = this.made.get(kind);
-      const view = path ? viewOf(kind, path) : null;
+      const view = path ? (kind === "ground" ? viewOf("estimates", this.estimates) : viewOf(kind, path)) : null; // a ground is seen on its drive
       const outside = view !== null && !view.startsWith("#");
       return h("li", {}, h("button", { type: "button", id: `next-${kind}`, click: work }, text), path ? (view ? h("a", { href: view, id: `see-${kind}`, target: outside ? "_blank" : null }, `See ${path}`) : h("span", { class: "good" }, path)) : null);
     };
@@ -383,16 +386,4 @@ export class LogPage {
     await this.offerNext();
     this.proposeOutput();
   }
-}
-
-function choice(id: string, paths: string[], chosen: string, none: string): HTMLSelectElement {
-  return h("select", { id }, offered(paths, chosen, none));
-}
-
-function offered(paths: string[], chosen: string, none: string): HTMLElement[] {
-  return [h("option", { value: "" }, none), ...paths.map((path) => h("option", { value: path, selected: path === chosen }, path))];
-}
-
-function row(label: string, field: HTMLElement): HTMLElement {
-  return h("div", { class: "field" }, h("label", { for: field.id }, label), field);
 }

@@ -3,6 +3,7 @@
 import { get, send } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
+import { row } from "./fields";
 import { commandLine } from "./jobs";
 import { sketch, type Vehicle } from "./sketch";
 
@@ -197,8 +198,4 @@ function typical(field: Field): string {
   const unit = field.unit === "1" ? "" : ` ${field.unit}`;
   if (field.value === null || field.spread === null) return "none";
   return field.is_spread ? `± ${digits(field.value)}${unit}` : `${digits(field.value)} ± ${digits(field.spread)}${unit}`;
-}
-
-function row(label: string, field: HTMLElement): HTMLElement {
-  return h("div", { class: "field" }, h("label", { for: field.id }, label), field);
 }

@@ -3,6 +3,7 @@
 import { get, send } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
+import { numberField } from "../ui/number";
 import { svg } from "./sketch";
 import { WheelNames } from "./wheels";
 
@@ -68,6 +69,7 @@ export class Mapping {
   private own = ""; // the profile written by this page, which it may overwrite
   private kept = new Map<string, Choice>(); // what the profile has that the choice began with
   private profile = "";
+  private turn = 0;
   readonly names = new WheelNames(() => this.nameRows());
 
   constructor(
@@ -77,9 +79,12 @@ export class Mapping {
 
   /** Preview the log, with the choice that a `profile` has, else what is proposed; `output` is the profile to write in place of it. */
   async open(output: string, profile = ""): Promise<Look | undefined> {
+    const turn = ++this.turn;
     fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
     try {
-      this.look = await get<Look>("columns", { path: this.log, profile: profile || undefined });
+      const look = await get<Look>("columns", { path: this.log, profile: profile || undefined });
+      if (turn !== this.turn) return this.look; // another profile was chosen meanwhile
+      this.look = look;
     } catch (error) {
       fill(this.element, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
       return undefined;
@@ -92,13 +97,13 @@ export class Mapping {
       const best = channel.proposals[0];
       const entry = kept?.channels[channel.name];
       if (entry) this.take(channel, entry);
-      else if (best && !kept) this.chosen.set(channel.name, { column: keyOf(best), entry: { ...best.entry } });
+      else if (best && !kept) this.chosen.set(channel.name, { column: keyOf(best), entry: entryOf(best) });
     }
     this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
     if (kept?.time) this.look.time = kept.time;
     this.names.of(this.look.channels);
-    this.draw(this.profile || output);
+    this.draw(this.profile || output, profile);
     return this.look;
   }
 
@@ -142,7 +147,7 @@ export class Mapping {
     this.wheels.push(...wheels);
   }
 
-  private draw(output: string): void {
+  private draw(output: string, profile: string): void {
     const look = this.look as Look;
     const name = h("input", { type: "text", id: "profile-output", value: output });
     const use = h("button", { type: "button", class: "primary", id: "use-columns", click: () => void this.save(name.value.trim()) }, "Use these columns");
@@ -152,7 +157,7 @@ export class Mapping {
     fill(
       this.element,
       this.refused,
-      h("p", { class: "hint" }, this.profile ? `The choice saved in ${this.profile}.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
+      h("p", { class: "hint" }, this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
       look.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
       this.timeRow(look),
@@ -197,7 +202,7 @@ export class Mapping {
     const select = h("select", { id: `column-${channel.name}` }, h("option", { value: "" }, "– none –"));
     if (channel.proposals.length) {
       const group = h("optgroup", { label: "Likely" });
-      for (const one of channel.proposals) group.append(option(keyOf(one), `${one.doubt ? "? " : ""}${keyOf(one)}`, keyOf(one) === choice?.column));
+      for (const one of channel.proposals) group.append(option(keyOf(one), `${one.doubt || one.give ? "? " : ""}${keyOf(one)}`, keyOf(one) === choice?.column));
       select.append(group);
     }
     const likely = new Set(channel.proposals.map(keyOf));
@@ -235,8 +240,9 @@ export class Mapping {
       else delete choice.entry.unit;
     });
     if (!proposal?.give && choice.entry.scale === undefined) return field;
-    const scale = h("input", { type: "number", step: "any", class: "unit", value: String(choice.entry.scale ?? 1), "aria-label": `Scale of ${channel.name}` });
-    scale.addEventListener("change", () => (choice.entry.scale = Number(scale.value) || 1));
+    const known = choice.entry.scale ?? (this.kept.get(channel.name)?.column === choice.column ? 1 : "");
+    const placeholder = String(proposal?.entry.scale ?? "");
+    const scale = numberField({ class: "unit", value: String(known), placeholder, required: true, "aria-label": `Scale of ${channel.name}` }, (typed) => (choice.entry.scale = typed));
     return h("span", { class: "two" }, h("span", {}, "×"), scale, field);
   }
 
@@ -261,7 +267,7 @@ export class Mapping {
     const proposal = channel.proposals.find((one) => keyOf(one) === column);
     const unit = this.look?.columns.find((one) => one.name === column)?.unit;
     const kept = this.kept.get(channel.name);
-    const entry = kept?.column === column ? { ...kept.entry } : proposal ? { ...proposal.entry } : { from: column, ...(unit && channel.unit ? { unit } : {}) };
+    const entry = kept?.column === column ? { ...kept.entry } : proposal ? entryOf(proposal) : { from: column, ...(unit && channel.unit ? { unit } : {}) };
     this.chosen.set(channel.name, { column, entry });
   }
 
@@ -270,6 +276,12 @@ export class Mapping {
     if (twice) {
       note(`${twice.join(" and ")} have the same name: ${this.names.nameOf(twice[0])}. Each must be a different wheel or axle.`, "error");
       this.names.focus(twice[1]);
+      return;
+    }
+    const wrong = this.element.querySelector<HTMLInputElement>("input:invalid");
+    if (wrong) {
+      wrong.closest("details:not([open])")?.setAttribute("open", "");
+      wrong.reportValidity();
       return;
     }
     const isOld = output === this.profile && output !== this.own;
@@ -288,6 +300,12 @@ function option(value: string, text: string, selected: boolean): HTMLElement {
   return h("option", { value, selected }, text);
 }
 
+/** What a proposal makes of a channel; not the scale that only the user can know. */
+function entryOf({ entry, give }: Proposal): Entry {
+  const { scale, ...rest } = entry;
+  return give ? rest : { ...entry };
+}
+
 /** What a proposal is called: its column, or what is made of several. */
 function keyOf(proposal: Proposal): string {
   return proposal.columns.length === 1 && "from" in proposal.entry ? (proposal.columns[0] as string) : `from ${proposal.columns.join(", ")}`;
@@ -299,7 +317,7 @@ function reason(choice: Choice | undefined, proposal: Proposal | undefined, colu
   const range = column && column.minimum !== null ? `${digits(column.minimum, fine)} to ${digits(column.maximum, fine)}, median ${digits(column.median, fine)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
   if (profile) return `as saved in ${profile}${range && `; ${range}`}`;
   if (!proposal) return `chosen by you; ${range}`;
-  const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [proposal.give] : [])];
+  const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [`? ${proposal.give}`] : [])];
   return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ").replace(/\?$/, "")}. ${range}`;
 }
 

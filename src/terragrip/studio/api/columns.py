@@ -38,7 +38,7 @@ def columns_of(studio: Here, path: Named, vehicle: str = "", profile: str = "") 
 
     look = studio.logs.get(studio.folder.file(path))
     wheels = tuple(Vehicle.load(studio.folder.file(vehicle)).wheels) if vehicle else ()
-    kept = _choice(studio.folder.file(profile)) if profile else None
+    kept = _choice(studio.folder.profile(profile)) if profile else None
     plain: dict[str, Any] = finite(
         {
             "kept": kept,
@@ -90,7 +90,7 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     return {"path": wanted.output, "text": text}
 
 
-def _choice(profile: Path) -> dict[str, Any] | None:
+def _choice(profile: str) -> dict[str, Any] | None:
     """A profile's `time` and `channels`; None where `save_profile` would lose something of it."""
     from terragrip.formats import Profile
 

@@ -144,13 +144,17 @@ def _distance(studio: Studio, path: str) -> float | None:
 
 
 def _ground(studio: Studio, path: str) -> dict[str, Any] | None:
-    """The ground of this run: of NAME.ground.json or NAME-ground.json beside it, else of a ground.json there or in the folder above
-    (as `terragrip demo` lays it). A file of several runs gives the entries of this one, and nothing where it is not among them."""
+    """The ground of this run: of NAME.ground.json or NAME-ground.json beside it, else of the newest ground file there that has the run
+    among its own, else of a ground.json in the folder above (as `terragrip demo` lays it)."""
     stem = path.removesuffix(".parquet")
     folder = path.rpartition("/")[0]
     above = folder.rpartition("/")[0]
     own = [f"{stem}.ground.json", f"{stem}-ground.json"]
-    shared = list(dict.fromkeys(f"{place}/ground.json".lstrip("/") for place in (folder, above)))
+    newest = sorted(studio.folder.items(), key=lambda item: -item.modified)
+    beside = [
+        item.path for item in newest if item.kind == "ground" and item.path.rpartition("/")[0] == folder
+    ]
+    shared = [*beside, f"{above}/ground.json".lstrip("/")]
     for name in own + shared:
         try:
             data = json.loads(studio.folder.file(name).read_bytes())
@@ -168,7 +172,7 @@ def _of_run(data: dict[str, Any], run: str, *, alone: bool) -> dict[str, Any] | 
     """Changes and sections of one run in a ground file, None where it holds other runs only. A file that is named after the run
     (`alone`) and holds one run holds this one, whatever it was called when it was written."""
     entries = [*data["changes"], *data["sections"], *data.get("runs", [])]
-    runs = {one.get("run", run) for one in entries}
+    runs = {one.get("run", run if alone else None) for one in entries}
     if run not in runs:
         if not (alone and len(runs) == 1):
             return None
