@@ -476,6 +476,22 @@ def test_any_text_of_a_pattern_is_no_command(foreign: pd.DataFrame, command: str
         np.testing.assert_array_equal(profile.apply(log)["ground_speed"], expected)
 
 
+def test_patterns_take_no_column_of_another_machine(foreign: pd.DataFrame) -> None:
+    """Of two robots in one bag the ground speed was the other's, where the first had none that the profile prefers."""
+    names = {"rpm_left": "/r1/joints.fl", "kmh": "/r2/vel.x"}
+    log = foreign.rename(columns=names).assign(**{"/r2/joints.fl": 1.0, "/r2/fix.x": 2.0, "/r1/fix.x": 3.0})
+    speed = {"from": ["*vel.x", "*fix.x"]}
+    channels = {"ground_speed": speed, "wheel_speed_fl": "*joints.fl"}
+    result = Profile.from_dict({"time": {"from": "stamp"}, "channels": channels}).apply(log)
+    np.testing.assert_array_equal(result["ground_speed"], 3.0)
+    assert any("several machines, /r1, /r2, of which /r1 is read" in note for note in result.notes)
+    # What the profile names counts, and a namespace of its own for each sensor is no machine.
+    stated = {"ground_speed": "/r2/vel.x", "wheel_speed_fl": "/r1/joints.fl"}
+    result = Profile.from_dict({"time": {"from": "stamp"}, "channels": stated}).apply(log)
+    np.testing.assert_array_equal(result["ground_speed"], foreign["kmh"])
+    assert not any("machines" in note for note in result.notes)
+
+
 def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None:
     profile = Profile.from_dict({"channels": {"ground_speed": {"from": "kmh", "unit": "km/h"}}})
     with pytest.raises(

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import bz2
 import random
+import shutil
+import sqlite3
 import struct
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,14 +15,16 @@ from typing import Any
 import lz4.frame
 import numpy as np
 import pytest
+import yaml
 from rosbags.rosbag1 import Reader, ReaderError, Writer
+from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from terragrip.errors import InputError
 from terragrip.formats.messages import Topic
 from terragrip.formats.reading import read_table
 from terragrip.formats.ros_types import Types
-from test_logs import COUNT, fill, write_ros1
+from test_logs import COUNT, fill, write_ros1, write_ros2
 
 DEFINITION = """std_msgs/Header header
 bool locked
@@ -242,3 +247,40 @@ def test_an_integer_beyond_all_numbers_leaves_the_others_in_their_places() -> No
         topic.push(float(k), b"", lambda _, value=value: (None, {"t.x": value}))
     assert topic.strange == 1
     np.testing.assert_array_equal(np.array(topic._columns["t.x"].numbers), [1.0, np.nan, 2.0])
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+def test_parts_of_a_bag_that_are_torn_empty_packed_or_gone(tmp_path: Path, plugin: StoragePlugin) -> None:
+    """What a part held was missing without a word; a torn one of SQLite, or an empty one, cost the whole bag."""
+    folder = write_ros2(tmp_path / "run", plugin, ("/joint_states",))
+    first = next(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap"))
+    whole, names = first.read_bytes(), [f"run_{k}{first.suffix}" for k in range(5)]
+    first.unlink()
+    for name, content in zip(names, (whole[: len(whole) * 2 // 3], b"", whole), strict=False):
+        (folder / name).write_bytes(content)
+    (folder / f"{names[3]}.zst").write_bytes(b"")
+    (folder / "metadata.yaml").write_text(
+        yaml.safe_dump({"rosbag2_bagfile_information": {"relative_file_paths": names}})
+    )
+    table = read_table(folder)
+    assert np.isfinite(table.columns["/joint_states.velocity.front_left_wheel"]).sum() == COUNT
+    for words in ("0{} ", "1{} is a damaged", "3{}.zst is packed", "4{} is missing"):
+        assert sum(words.format(first.suffix) in note for note in table.notes) == 1, words
+    if plugin is StoragePlugin.SQLITE3:  # this MCAP is one chunk
+        assert COUNT * 0.2 < len(read_table(folder / names[0]).columns["time"]) < COUNT
+
+
+def test_messages_that_a_killed_recorder_left_beside_the_bag(tmp_path: Path) -> None:
+    """17 of 60 s of such a bag were read, without a word: SQLite's write-ahead file was not looked at."""
+    file = next(write_ros2(tmp_path / "run", StoragePlugin.SQLITE3, ("/joint_states",)).glob("*.db3"))
+    killed = tmp_path / "killed"
+    with closing(sqlite3.connect(file)) as base:
+        base.execute("PRAGMA journal_mode = WAL")
+        base.execute("CREATE TEMP TABLE late AS SELECT * FROM messages WHERE id > 50")
+        base.execute("DELETE FROM messages WHERE id > 50")
+        base.commit()
+        base.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        base.execute("INSERT INTO messages SELECT * FROM late")
+        base.commit()
+        shutil.copytree(file.parent, killed)
+    assert len(read_table(killed).columns["time"]) == COUNT

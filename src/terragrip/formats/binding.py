@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +24,7 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     Of several candidates the first with a value counts. Raises InputError at the first column that the log lacks,
     and names the nearest one; an optional channel is left out instead, and of a ``partial`` log any.
     """
-    notes: list[str] = []
+    log, notes = _of_one_machine(profile, log)
     absent: list[str] = []
     channels: dict[str, Source] = {}
     for name, origin in profile.channels.items():
@@ -65,6 +66,39 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             raise _missing(rows.column, log)
         rows = None
     return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
+
+
+def _of_one_machine(profile: Profile, log: LogTable) -> tuple[LogTable, list[str]]:
+    """The log with the columns beside its wheels' first (``/r1`` of ``/r1/joint_states``), and a sentence on other machines in it.
+
+    Namespaces in which each wheel speed is found are machines: no pattern ``*...`` may take from another what the first one lacks.
+    """
+    names = {
+        key: [n for one in source.chain for n in one.columns] for key, source in profile.channels.items()
+    }
+    found = {key: [c for n in own for c in matching(n, log.columns)] for key, own in names.items()}
+    speeds = [
+        list(map(_namespace, found[key])) for key in found if key.startswith("wheel_") and "speed" in key
+    ]
+    home, *others = dict.fromkeys(n for n in (speeds or [[]])[0] if all(n in own for own in speeds)) or [""]
+    if not home:
+        return log, []
+    stated = {
+        c for own in names.values() for n in own if not n.startswith("*") for c in matching(n, log.columns)
+    }
+    kept = [c for c in log.columns if c in stated or _namespace(c) not in others]
+    kept.sort(key=lambda c: _namespace(c) != home)
+    sentence = (
+        f"The log has several machines, {', '.join((home, *others))}, of which {home} is read; "
+        "for another one name its columns in a profile."
+    )
+    return replace(log, columns={c: log.columns[c] for c in kept}), [sentence] if others else []
+
+
+def _namespace(column: str) -> str:
+    """``/r1`` of ``/r1/joint_states.velocity.fl``; empty without one."""
+    parts = column.partition(".")[0].split("/")
+    return f"/{parts[1]}" if len(parts) > 2 and not parts[0] else ""
 
 
 def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:

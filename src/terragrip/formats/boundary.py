@@ -89,5 +89,6 @@ def as_far_as_it_goes(
         if not seen.messages:
             raise
         notes.append(
-            f"The file ends early, or is damaged ({error.problem}); {seen.messages} messages before were read."
+            f"{os.path.basename(source)} ends early, or is damaged ({error.problem}); "
+            f"{seen.messages} messages before were read."
         )

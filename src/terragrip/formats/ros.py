@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import yaml
+
 from terragrip.errors import InputError
-from terragrip.formats.boundary import as_far_as_it_goes
+from terragrip.formats.boundary import DAMAGE, as_far_as_it_goes
 from terragrip.formats.mcap import collect
 from terragrip.formats.messages import Decode, Topic, log_of
 from terragrip.formats.registry import Databases, Format
@@ -54,36 +57,61 @@ def read_ros2(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
     """
     types = Types("LATEST")
     topics: dict[str, Topic] = {}
-    files, notes = _files_of(path), list[str]()
+    files, notes = _files_of(path)
     for file in files:
-        if files[0].suffix == ".mcap":
-            notes += collect(file, wanted, topics, types)
-        else:
-            _collect(file, wanted, topics, types, notes)
+        try:
+            if file.suffix == ".mcap":
+                notes += collect(file, wanted, topics, types)
+            else:
+                _collect(file, wanted, topics, types, notes)
+        except InputError as error:
+            if len(files) == 1 or error.file is None:
+                raise
+            notes.append(f"{file.name} {error.problem}, and was left out.")
     return log_of(topics.values(), path, [*types.notes(), *notes], files)
 
 
-def _files_of(path: str) -> list[Path]:
-    """The files of a bag that is a folder or one file, in the order of their names."""
-    if Path(path).is_file():
-        return [Path(path)]
-    for suffix in (".db3", ".mcap"):
-        result = sorted(p for p in Path(path).iterdir() if p.suffix == suffix)
-        if result:
-            return result
-    packed = [p.name for p in Path(path).iterdir() if p.suffix in (".zstd", ".zst")]
-    hint = (
-        f"unpack {packed[0]} first (zstd -d)" if packed else "name the bag's folder, with .db3 or .mcap files"
-    )
-    raise InputError("has no bag file", file=path, hint=hint)
+def _files_of(path: str) -> tuple[list[Path], list[str]]:
+    """The files of a bag that is a folder or one file, in the order of their names, and sentences on those that are not there."""
+    folder = Path(path)
+    if folder.is_file():
+        return [folder], []
+    inside = sorted(folder.iterdir())
+    files = [p for p in inside if p.suffix == ".db3"] or [p for p in inside if p.suffix == ".mcap"]
+    packed = [p.name for p in inside if p.suffix in (".zstd", ".zst")]
+    if not files:
+        hint = (
+            f"unpack {packed[0]} first (zstd -d)" if packed else "name its folder, with .db3 or .mcap files"
+        )
+        raise InputError("has no bag file", file=path, hint=hint)
+    read = {file.name for file in files}
+    parts = {re.sub(r"\.zstd?$", "", name): name for name in (*_stated(folder), *packed)}
+    return files, [
+        f"{name} is {'packed' if name in packed else 'missing'}: what that part of the bag holds is not read."
+        for unpacked, name in parts.items()
+        if unpacked not in read
+    ]
+
+
+def _stated(folder: Path) -> list[str]:
+    """The files that a bag's ``metadata.yaml`` names, as far as it can be read."""
+    try:
+        whole = yaml.safe_load((folder / "metadata.yaml").read_bytes())
+        return [Path(name).name for name in whole["rosbag2_bagfile_information"]["relative_file_paths"]]
+    except (*DAMAGE, yaml.YAMLError):
+        return []
 
 
 def _collect(file: Path, wanted: Wanted, topics: dict[str, Topic], types: Types, notes: list[str]) -> None:
     """Read the messages of one SQLite file into their topics."""
+    # A recorder that was killed leaves its last messages in a file beside it, which a base that cannot change would not have.
+    journal = file.with_name(f"{file.name}-wal")
+    mode = "ro" if journal.is_file() and journal.stat().st_size else "ro&immutable=1"
     with (
         as_far_as_it_goes(file, "ROS 2 bag", notes, sqlite3.Error) as seen,
-        closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base,
+        closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode={mode}", uri=True)) as base,
     ):
+        base.execute("PRAGMA writable_schema = ON")  # else one that was cut off is refused as a whole
         known = _topics_of(base, wanted, topics, types)
         # Asked of each row before its message is looked at: images of which nothing is wanted are not even read.
         base.create_function("is_wanted", 1, lambda number: number in known and known[number][0].is_wanted)
