@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Collection
 from typing import Annotated, Any, Literal, Self
@@ -243,6 +244,19 @@ class Sensors(Part):
     hitch_load: _ForceSD | None = None
 
 
+PITCH_ZERO = math.radians(0.2)
+"""SD [rad] of a pitch sensor's zero, its mounting included: the vehicle file has no key for it."""
+
+_UNSTATED = {
+    "drive_torque_gain": 0.1,  # of motor currents and of strain gauges on a shaft
+    "drawbar_gain": 0.01,
+    "slope": math.radians(0.5),
+    "wheel_radius": 0.02,  # docs/vehicle.md
+    "vertical_load": 0.01,  # of the mean axle load, of an axle that was weighed
+    "acceleration_bias": 0.3,  # mounting included
+}
+
+
 class Uncertainty(Part):
     """Prior standard deviations of constants that the data cannot determine: they widen the intervals (physics.md 6)."""
 
@@ -262,6 +276,14 @@ class Uncertainty(Part):
     hitch_load_gain: _Ratio | None = None
     hitch_load_offset: _Force | None = None
     acceleration_bias: _Acceleration | None = None
+
+    def assumed(self, key: str) -> float:
+        """SD of a constant [SI]: as the file states it (``key``), else what such a sensor or machine usually has (ours).
+
+        Raises KeyError for a key whose usual SD nothing needs.
+        """
+        stated: float | None = getattr(self, key)
+        return _UNSTATED[key] if stated is None else stated
 
     def of_pull(self, channels: Collection[str]) -> float:
         """SD [N] of a lasting error of the pull: of the cell's zero where ``channels`` have a drawbar force, else of the pull itself."""

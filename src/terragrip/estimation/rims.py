@@ -22,8 +22,6 @@ from terragrip.vehicle import Vehicle
 DRIVE = "drive"
 """Name of the wheel that represents all driven ones, where only the drive train's speed is measured."""
 
-_RADIUS = 0.02  # relative SD of a radius that the vehicle file gives without one
-
 
 @dataclass(frozen=True)
 class Rim:
@@ -53,8 +51,7 @@ def speeds_alone(channels: Collection[str], vehicle: Vehicle) -> bool:
 
 def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = None) -> tuple[Rim, ...]:
     """The rims in samples of these columns, by the vehicle file's radii; raises InputError on a wheel it does not have."""
-    stated = vehicle.uncertainty.wheel_radius
-    spread = _RADIUS if stated is None else stated
+    spread = vehicle.uncertainty.assumed("wheel_radius")
     named = [name.removeprefix("wheel_speed_") for name in channels if name.startswith("wheel_speed_")]
     for wheel in named:
         if wheel not in vehicle.wheels:
@@ -72,7 +69,8 @@ def rims_of(vehicle: Vehicle, channels: Collection[str], source: str | None = No
         )
     supposed, calibrated = supposed_radius(vehicle), calibrated_scale(vehicle)
     if calibrated is None:
-        calibrated, spread = 1.0, UNDETERMINED if stated is None else stated
+        calibrated = 1.0
+        spread = UNDETERMINED if vehicle.uncertainty.wheel_radius is None else spread
     return (
         Rim(
             DRIVE,

@@ -18,7 +18,7 @@ from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.recording.checks import require_hitch
 from terragrip.vehicle import Vehicle
-from terragrip.vehicle_parts import BidermanRadius, HadekelRadius, Wheel
+from terragrip.vehicle_parts import PITCH_ZERO, BidermanRadius, HadekelRadius, Wheel
 
 
 @dataclass(frozen=True)
@@ -202,9 +202,6 @@ def _set_calibration(settings: Any, vehicle: Vehicle) -> None:
     settings.offset[lib.TG_PITCH] = vehicle.calibration.pitch_offset
 
 
-_SENSED_SLOPE = np.deg2rad(0.2)  # SD of a pitch sensor's mounting, if the vehicle file has none
-
-
 def _set_uncertainty(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> None:
     """The vehicle file's spreads. A measured pitch leaves only its mounting unknown, not the slope; without a cell the pull itself is
     unknown, not a cell's zero."""
@@ -214,4 +211,4 @@ def _set_uncertainty(settings: Any, vehicle: Vehicle, channels: Collection[str])
         setattr(spread, name, getattr(given, name) or 0.0)
     spread.drawbar_offset = given.of_pull(channels)
     if "pitch" in channels and given.slope is not None:
-        spread.slope = min(given.slope, _SENSED_SLOPE)
+        spread.slope = min(given.slope, PITCH_ZERO)

@@ -38,8 +38,6 @@ COUNTED = ("", "immobilization")
 """Events whose rows count: a wet hole is where the warning is given."""
 WIDEST_STD = 0.5
 """A row whose own SD is wider says nothing."""
-UNSTATED_RADIUS = 0.02
-"""Relative SD of wheel radii where the vehicle file states none and slip alone is estimated (docs/vehicle.md)."""
 REFERENCE_SLIPS = (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2)
 """Slips that adhesion is mapped at where the user names none: the one next to the drive's own. A curve's form carries a value
 from a few per cent of slip to 20 % no better than by a third."""
@@ -99,7 +97,8 @@ def readings_of(
     vehicle = estimates.vehicle
     counted = np.isin(estimates["event"].astype(str), COUNTED)
     form = _form(estimates, reference_slip, library)
-    radius = vehicle.uncertainty.wheel_radius or (0.0 if estimates.has_adhesion else UNSTATED_RADIUS)
+    stated = vehicle.uncertainty
+    radius = (stated.wheel_radius or 0.0) if estimates.has_adhesion else stated.assumed("wheel_radius")
     for i, wheel, forward, left in _driven(estimates, vehicle):
         place = places.of(forward, left)
         slip, slip_std = estimates[f"slip_{wheel}"], estimates[f"slip_{wheel}_std"]

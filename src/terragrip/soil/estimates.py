@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 
-UNSTATED_RADIUS = 0.02
-"""Relative SD of the rolling radius where the vehicle file does not say (docs/vehicle.md)."""
-
-
 def soils_of(
     files: Sequence[str | os.PathLike[str]],
     curve: AdhesionCurve | None = None,
@@ -158,8 +154,7 @@ class GatheredRuns:
 
 def zero_slip_sd(vehicle: Vehicle) -> float:
     """SD of the slip at zero slip, by the rolling radius: all logs of the machine share it."""
-    known = vehicle.uncertainty.wheel_radius
-    return UNSTATED_RADIUS if known is None else known
+    return vehicle.uncertainty.assumed("wheel_radius")
 
 
 def torque_scale_sd(vehicle: Vehicle) -> float:

@@ -13,9 +13,6 @@ from terragrip.recording import Recording
 from terragrip.recording.track import track_of
 from terragrip.vehicle import Vehicle
 
-UNSTATED_GAIN = 0.1
-"""Relative SD of a torque channel's gain where the vehicle states none: that of motor currents and of strain gauges on a shaft."""
-
 # Times: gains of an axle's wheels, and of two axles whose loads differ by a fifth and are exchanged.
 _ALIKE, _APART = 1.12, 1.4
 _CALM = 4.0  # s: slips are compared to some tenths of a per cent

@@ -14,7 +14,6 @@ from terragrip.errors import InputError
 from terragrip.estimation.calibration import zeros
 from terragrip.estimation.calibration.gains import ChannelErrors, RelativeGains, relative_gains
 from terragrip.estimation.calibration.plausible import (
-    UNSTATED_GAIN,
     completed_by_positions,
     gains_by_axle,
     plausible,
@@ -31,12 +30,10 @@ from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
+from terragrip.vehicle_parts import PITCH_ZERO
 
-_SLOPE, _PITCH_ZERO = float(np.radians(0.5)), float(np.radians(0.2))  # priors where the vehicle gives none
-_UNSTATED_RADIUS = 0.02  # relative, likewise
-_AXLE_LOAD = 0.01  # of the mean axle load, likewise, of an axle that was weighed
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
-_SENSOR_BIAS = 0.03  # m/s^2, likewise, of an accelerometer
+_SENSOR_BIAS = 0.03  # m/s^2 where the vehicle gives none, of an accelerometer that is level to .2 deg
 
 
 def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
@@ -244,26 +241,26 @@ def _channel_errors(
 ) -> ChannelErrors:
     """Errors that the channels keep: they move load between the wheels, and thereby change the gains."""
     stated, errors = vehicle.uncertainty, {quantity.name: quantity.std for quantity in quantities}
-    ground = GRAVITY * (_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(logs))
+    ground = GRAVITY * stated.assumed("slope") / np.sqrt(len(logs))
     sensor = _SENSOR_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
     measured = all("acceleration_x" in log.channels for log in logs)
     pitched = all("pitch" in log.channels for log in logs)
-    kinematic = GRAVITY * _PITCH_ZERO if pitched else ground
+    kinematic = GRAVITY * PITCH_ZERO if pitched else ground
     push = errors.get("acceleration_bias_x", sensor) if measured else kinematic
     lateral = sensor if all("acceleration_y" in log.channels for log in logs) else ground
     return ChannelErrors(
         push=float(push),
         lateral=float(lateral),
         drawbar=float(errors.get("drawbar_offset", stated.drawbar_offset or 0.0)),
-        axle_load=_AXLE_LOAD if stated.vertical_load is None else stated.vertical_load,
+        axle_load=stated.assumed("vertical_load"),
     )
 
 
 def _common_radius(rolling: Rolling | Unknown, vehicle: Vehicle) -> float:
     """Relative error that the radii of all driven wheels may share."""
-    stated = vehicle.uncertainty.wheel_radius
-    prior = _UNSTATED_RADIUS if stated is None else stated
-    return float(np.mean(rolling.std[vehicle.driven])) if isinstance(rolling, Rolling) else prior
+    if isinstance(rolling, Rolling):
+        return float(np.mean(rolling.std[vehicle.driven]))
+    return vehicle.uncertainty.assumed("wheel_radius")
 
 
 def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]) -> list[Quantity]:
@@ -273,10 +270,10 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
     key, stated = quantities[0].key, vehicle.uncertainty
     relative = key in ("drive_torque_gain", "wheel_radius")
     prior = {
-        "drive_torque_gain": UNSTATED_GAIN if stated.drive_torque_gain is None else stated.drive_torque_gain,
+        "drive_torque_gain": stated.assumed("drive_torque_gain"),
         "drive_torque_offset": stated.drive_torque_offset,
         "drawbar_offset": stated.drawbar_offset,
-        "wheel_radius": _UNSTATED_RADIUS if stated.wheel_radius is None else stated.wheel_radius,
+        "wheel_radius": stated.assumed("wheel_radius"),
     }.get(key)
     errors = [q.spread / (abs(q.value) if relative else 1.0) for q in quantities]
     if prior is None or max(errors) < prior:

@@ -44,11 +44,9 @@ _LEAST = 20  # windows
 _BLOCKS = 20  # of correlated windows, for the error
 _SLIP_RESISTANCE = 0.1  # prior SD of dρ_s/ds: hard ground 0, Brixius 0.06 to 0.1
 _MOST_SLIP = 0.2  # beyond, resistance grows faster; much less leaves out the starts of a log that has few
-_SLOPE = float(np.radians(0.5))  # prior of a slope that nothing measures, where the vehicle states none,
-_WITH_PUSH = 0.3  # and of its correlation with pull and acceleration
+_WITH_PUSH = 0.3  # prior of the correlation of a slope that nothing measures with pull and acceleration
 _GROUND_WITH_GRADE = 0.006  # prior SD of the part of ρ_s that varies with the grade: .02 from place to place, correlated by .3 as above
 _STRETCH = 6  # windows without labels that may be a soil of their own
-_DRAWBAR_GAIN = 0.01  # prior where the vehicle states none
 _HUBER = 2.5
 _LABEL = "give a 'soil' column (for one soil 'soil: {constant: field}' in the profile), or change the pull every few seconds"
 _ROUNDING = 1e-9  # of a nuisance term, which is of size 1
@@ -258,17 +256,14 @@ def _unseen_slope(vehicle: Vehicle, rows: _Balance, weight: Floats, residual: Fl
     """Relative SD of K by a slope that neither pitch nor accelerometer measures: of what the vehicle states, or of what the balance leaves,
     since on hills that is mostly slope.
     """
-    stated = vehicle.uncertainty.slope
-    if rows.slope_known or stated == 0.0:
+    slope_std = vehicle.uncertainty.assumed("slope")
+    if rows.slope_known or slope_std == 0.0:
         return 0.0
-    slope = vehicle.mass * GRAVITY * (_SLOPE if stated is None else stated)
+    slope = vehicle.mass * GRAVITY * slope_std
     slope = max(slope, float(np.sqrt(np.mean(weight * residual**2))))
     force = _centered(rows.force[:, None], rows, weight)[:, 0]
     return _WITH_PUSH * slope / max(float(np.sqrt(np.mean(weight * force**2))), 1e-12)
 
 
 def _drawbar_gain(table: Windows, vehicle: Vehicle) -> float:
-    if not np.any(table.drawbar):
-        return 0.0
-    stated = vehicle.uncertainty.drawbar_gain
-    return _DRAWBAR_GAIN if stated is None else stated
+    return vehicle.uncertainty.assumed("drawbar_gain") if np.any(table.drawbar) else 0.0

@@ -16,6 +16,7 @@ from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.windows import Windows
 from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle import Vehicle
+from terragrip.vehicle_parts import PITCH_ZERO, Uncertainty
 
 WINDOW = 0.5
 """Window length [s] in which standstill is searched for."""
@@ -24,10 +25,6 @@ _STANDING = 0.03  # m/s, of vehicle and rims, as window means
 _LEAST_STANDING = 2.0  # s a spell must last
 _DRIVING = 0.1  # m/s
 _LEAST_FREE = 10.0  # s of driving with a bar that nothing moves
-_DEFAULT_PITCH = float(np.radians(0.2))  # prior of a pitch sensor's zero
-_DEFAULT_SLOPE = float(np.radians(0.5))  # prior of the slope where the vehicle states none
-# m/s^2, prior of an accelerometer's bias where the vehicle states none: mounting included.
-_UNKNOWN_BIAS = 0.3
 _UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle never stands: .3 deg/s
 _ALIKE = 3.0  # standard errors
 _ALONE = 4.0  # s that one stop must last to count without another that agrees: whoever stands for the zeros stands 10 s
@@ -190,7 +187,7 @@ def torque_zeros(
             why = "at standstill on a slope the torques are those that hold the vehicle: stand with the motors off"
             return [], [Unknown(key, why)]
         if not any(spell in released for spell in calm):
-            level = _DEFAULT_PITCH * vehicle.mass * GRAVITY * float(vehicle.wheel_radius.mean()) / len(driven)
+            level = PITCH_ZERO * vehicle.mass * GRAVITY * float(vehicle.wheel_radius.mean()) / len(driven)
     if not calm:
         least = min(
             (stop_means(torque, spell) for spell in stops), key=lambda mean: np.max(np.abs(mean) - allowed)
@@ -219,7 +216,7 @@ def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: slice
     """How much of the weight along a measured slope the driven wheels' ``torque`` (n, k) carries at a stop; NaN where it is level to three
     standard deviations of a pitch sensor's zero, or no pitch is known."""
     pitch = float(stop_means(windows.pitch[:, None], spell)[0])
-    if not abs(pitch) > 3 * _DEFAULT_PITCH:
+    if not abs(pitch) > 3 * PITCH_ZERO:
         return float("nan")
     thrust = np.sum(stop_means(torque, spell) / vehicle.wheel_radius[vehicle.driven])
     return float(thrust / (vehicle.mass * GRAVITY * np.sin(pitch)))
@@ -306,11 +303,11 @@ def inclination_zeros(
     stated = vehicle.uncertainty
     rests_on = evidence(windows, rows_of(stops), sources, windows.acceleration_count)
     # The ground differs from spell to spell, a sensor's zero does not.
-    ground = (_DEFAULT_SLOPE if stated.slope is None else stated.slope) / np.sqrt(len(stops))
-    other = GRAVITY * (_DEFAULT_PITCH if pitched else ground)
-    own = _UNKNOWN_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
+    ground = stated.assumed("slope") / np.sqrt(len(stops))
+    other = GRAVITY * (PITCH_ZERO if pitched else ground)
+    own = stated.assumed("acceleration_bias")
     if abs(total) > 3 * np.hypot(own, other):
-        own = max(own, _UNKNOWN_BIAS)
+        own = max(own, Uncertainty().assumed("acceleration_bias"))
     share = own**2 / (own**2 + other**2)
     left = own * other / np.hypot(own, other)
     sentence = (
