@@ -90,6 +90,13 @@ def test_a_profile_comes_back_from_what_the_file_keeps(name: str) -> None:
     assert Profile.from_dict(known.to_dict()).channels == known.channels
 
 
+def test_a_profiles_content_is_what_its_file_says(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("channels:\n  ground_speed: {from: v}\n")
+    assert Profile.load(tmp_path / "p.yaml").to_dict() == {"channels": {"ground_speed": {"from": "v"}}}
+    (tmp_path / "q.yaml").write_text("dbc: bus.dbc\nchannels:\n  ground_speed: {from: v}\n")
+    assert Profile.load(tmp_path / "q.yaml").to_dict()["dbc"] == [str(tmp_path / "bus.dbc")]
+
+
 def test_the_file_of_estimates_says_when_and_by_which_profile(tmp_path: Path) -> None:
     import json
 

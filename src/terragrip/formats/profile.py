@@ -80,8 +80,8 @@ class Profile(Part):
             hint = suggestion(name, SHIPPED, f"those are {', '.join(SHIPPED)}")
             raise InputError(f"{name!r} is neither a file nor a profile that comes with Terragrip", hint=hint)
         result = validate(cls, read_yaml(path))
-        here = Path(path).parent
-        return result.model_copy(update={"dbc": tuple(os.fspath(here / name) for name in result.dbc)})
+        databases = tuple(os.fspath(Path(path).parent / name) for name in result.dbc)
+        return result.model_copy(update={"dbc": databases} if databases else {})
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], file: str | None = None) -> Self:

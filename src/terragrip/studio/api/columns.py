@@ -95,7 +95,7 @@ def _choice(profile: str) -> dict[str, Any] | None:
     from terragrip.formats import Profile
 
     try:
-        whole = {key: part for key, part in Profile.load(profile).to_dict().items() if part}
+        whole = Profile.load(profile).to_dict()
     except InputError:  # said where the log is read by it
         return None
     time = set(whole.get("time", ()))
