@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -150,7 +151,8 @@ def inspect(
     seen = Seen.of(log, whole=every == 1)
     numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
-    add_signs(proposals, lambda own: _recording(log, seen.profile(own)), machine)
+    with suppress(InputError):  # a log that no profile of these proposals reads
+        add_signs(proposals, _recording(log, seen.profile(proposals)), machine)
     wheels = {channel for channel in proposals if channel.startswith("wheel_speed_")}
     # A robot's profile of four wheels, of six in the log.
     if wheels - fits.channels and wheels & fits.channels:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from terragrip.errors import InputError
 from terragrip.formats.recognition import Proposal, Proposals
 from terragrip.recording import Recording
 from terragrip.recording.plausibility import wrong_signs
@@ -19,15 +17,11 @@ _MOSTLY = 0.75  # of such rows
 _FORCES = ("drive_torque_", "drawbar_force")
 
 
-def add_signs(
-    proposals: Proposals,
-    read: Callable[[Proposals], Recording],
-    vehicle: Vehicle | None = None,
-) -> None:
+def add_signs(proposals: Proposals, recording: Recording, vehicle: Vehicle | None = None) -> None:
     """Give ``sign: -1`` to proposals whose channels the motion shows to be of the opposite sign, and a doubt where it does not decide.
 
-    ``read`` gives the log as a profile of such proposals reads it; where it raises InputError nothing is changed. A ``vehicle`` counts
-    only where it has these wheels, and no number of their proposals is left to the user: its forces need torques in N m.
+    ``recording``: the log as a profile of these proposals reads it. A ``vehicle`` counts only where it has these wheels, and no number of
+    their proposals is left to the user: its forces need torques in N m.
     """
     of_wheels = {c: p for c, p in proposals.items() if c.startswith(("wheel_speed_", "drive_torque_"))}
     known = () if vehicle is None else vehicle.wheels
@@ -35,10 +29,6 @@ def add_signs(
     machine = vehicle if fits else None
     turned: set[str] = set()
     while True:  # speeds first, then the torques and turns that are judged by them, one by one
-        try:
-            recording = read(proposals)
-        except InputError:
-            return
         notes = wrong_signs(recording, machine)
         named = {c: note for note in notes for c in note.channels if c in proposals and c not in turned}
         for channel, note in named.items():
@@ -50,6 +40,8 @@ def add_signs(
         turned |= named.keys()
         if not named:
             break
+        opposite = {c: -recording[c] for c, note in named.items() if note.sure}
+        recording = recording.with_channels(**opposite)
     for channel, (share, is_large) in _negative(recording).items():
         speed = channel.replace("drive_torque_", "wheel_speed_")
         if channel in turned or channel not in proposals:
