@@ -6,12 +6,13 @@ import pytest
 
 from drives import robot
 from terragrip._kernel import ffi
-from terragrip.estimation.settings import _SENSED_SLOPE, _set_uncertainty
+from terragrip.estimation.settings import _set_uncertainty
+from terragrip.vehicle_parts import PITCH_ZERO
 
 
 @pytest.mark.parametrize(
     ("stated", "channels", "slope"),
-    [(0.1, (), 0.1), (0.1, ("pitch",), _SENSED_SLOPE), (_SENSED_SLOPE / 2, ("pitch",), _SENSED_SLOPE / 2)],
+    [(0.1, (), 0.1), (0.1, ("pitch",), PITCH_ZERO), (PITCH_ZERO / 2, ("pitch",), PITCH_ZERO / 2)],
 )
 def test_a_measured_pitch_leaves_its_mounting_unknown_alone(
     stated: float, channels: tuple[str, ...], slope: float
