@@ -53,7 +53,7 @@ LIMITS = {
     "torques": "_LEAST _MOVES _STEADY _NEAR _DIPS _BRAKES _FEWEST _AS_HARD",
     "pitch": "_FEWEST _LONG _MOVED _BEYOND",
     "rescaled": "_COARSEST _LONG _SPEED _TORQUE _BEYOND_SPEED _BEYOND_TORQUE _EVEN _PULLING _SHARE",
-    "leaps": "_LEAST _BEYOND _SURE _STEPS _HALF _REST",
+    "leaps": "_LEAST _BEYOND _SURE _STEPS _HALF _REST _SOON",
     "mechanics": "_STRETCH _OFFSET",
     "plain_units": "_ON_TIME _EMPTY",
     "sides": "_APART _SPUN",

@@ -119,6 +119,21 @@ def test_which_of_three_is_off_is_named(name: str, factor: float, cause: str, se
     assert cause in note
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_dead_accelerometer_has_neither_sign_nor_unit(known: bool) -> None:
+    """Of one value its slope was 1e-16 with an error as small: 'write sign: -1' was advised, or 'unit: g'."""
+    columns = drive()
+    columns["acceleration_x"] = np.full(len(columns["time"]), 0.02)
+    (note,) = notes(columns, machine() if known else None)
+    assert note.startswith("acceleration_x (0.02) never changes")
+
+
+def test_a_torque_of_a_wrong_sign_is_named_alone() -> None:
+    """The sum of all is off, too: the scale of all, the mass and the drawbar force were to be checked."""
+    (note,) = notes(times(drive(), "drive_torque_fl", -1.0), machine())
+    assert note.startswith("drive_torque_fl falls where that of the axle's other wheel rises")
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_torques_in_pound_feet_are_named_where_nothing_is_towed(seed: int) -> None:
     """Given as N m they are .74 of what starts and stops need. Too large ones may pull a trailer that is not in the log."""

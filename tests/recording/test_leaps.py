@@ -102,6 +102,22 @@ def test_a_tool_that_comes_in_or_out_at_once_and_a_vehicle_that_coasts_are_no_er
     assert notes(coasting, vehicle) == []
 
 
+def test_a_start_into_softer_ground_is_no_moved_zero(
+    vehicle: Vehicle,
+) -> None:
+    """Its first sample leaps by .05 of the weight, and the ground resists by .06 more: 'their zero moved' was said."""
+    columns, weight = drive(vehicle, np.zeros(len(TIME))), vehicle.mass * G
+    start = 0.2 * weight * np.interp(TIME, [59.98, 59.99, 60.12, 60.4, 60.6, 60.8], [0, 0.25, 0.25, 1, 1, 0])
+    softer = 0.06 * weight * np.clip((TIME - 61) / 0.3, 0, 1)
+    speed = columns["ground_speed"] + np.cumsum(start) * 0.05 / vehicle.mass
+    torques = {name: columns[name] + (start + softer) * RADIUS / 4 for name in TORQUES}
+    wheels = {
+        f"wheel_speed_{w}": columns[f"wheel_speed_{w}"] * speed / columns["ground_speed"] for w in WHEELS
+    }
+    moved = {"ground_speed": speed} | torques | wheels
+    assert leap_warnings(Recording.from_frame(columns | moved), vehicle) == []
+
+
 def test_a_torque_in_coarse_steps_has_one_step_more_and_no_moved_zero(vehicle: Vehicle) -> None:
     """A pull that grows slowly, torques in steps of 20 N m: where one changes, the motion does not answer."""
     columns = drive(vehicle, 150 + 1.5 * TIME)

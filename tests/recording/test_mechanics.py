@@ -192,6 +192,13 @@ def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str
         assert bool(notes) == bool(expected)
 
 
+def test_a_cell_with_nothing_towed_is_not_in_kilonewtons() -> None:
+    """A cell's noise of .4 % of the weight comes to less than a thousandth in the mean over a second: 'unit: kN' was advised."""
+    columns = drive()
+    noise = np.random.default_rng(9).normal(0, 0.004 * MASS * G, len(columns["time"]))
+    assert notes_on({**columns, "drawbar_force": noise}) == ""
+
+
 @pytest.mark.parametrize("sensors", SENSORS)
 def test_a_trailer_that_pushes_downhill_is_no_wrong_sign(sensors: str) -> None:
     """'sign: -1' was advised for a cell, and for torques, that read right; with the other sign it is advised still."""

@@ -111,7 +111,9 @@ class Courses:
         change = np.gradient(speed, step)
         if _known(recording, "pitch"):
             change = change + STANDARD_GRAVITY * np.sin(calm(at("pitch")))
-        shown = quick(calm(at("acceleration_x"))) if _known(recording, "acceleration_x") else None
+        shown = None
+        if _known(recording, "acceleration_x") and not _is_dead(channels["acceleration_x"]):
+            shown = quick(calm(at("acceleration_x")))
         thrust = pull = None
         torques = [f"drive_torque_{w}" for w in radii]
         if vehicle is not None and torques and _known(recording, *torques):
@@ -211,3 +213,9 @@ def _imbalance(mass: Range, beside: str, causes: list[str], vehicle: Vehicle) ->
 
 def _known(recording: Recording, *names: str) -> bool:
     return all(np.isfinite(recording.channels.get(name, np.nan)).sum() > 1 for name in names)
+
+
+def _is_dead(values: Floats) -> bool:
+    """Whether the finite values are all the same but for rounding, of which a slope, of either sign, is surely not 1."""
+    known = values[np.isfinite(values)]
+    return bool(np.ptp(known) <= 1e-9 * np.max(np.abs(known)))

@@ -35,6 +35,7 @@ _BEYOND = 3.0  # standard deviations of what the balance is left with all the ti
 _STEPS = 1.5  # of a channel's resolution: one step of it is no leap
 _HALF = 0.5  # of it, at least, is between two samples
 _REST = 0.25  # of it, at most, is answered, or gone again
+_SOON = 1.0  # s before and after: a tool's pull, or a start into other soil, leaps in part and is answered while it still changes
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,20 @@ class _Drive:
     inside: Bools
     speed: Floats
 
-    def shift(self, values: Floats) -> Floats:
-        """The mean of a channel (n + 1,) over `LONG` after each instant less that before it."""
+    def shift(self, values: Floats, span: float = LONG) -> Floats:
+        """The mean of a channel (n + 1,) over ``span`` [s] after each instant less that before it."""
         steps = np.diff(self.time)
         area = np.r_[0.0, np.cumsum(steps * (values[1:] + values[:-1]) / 2)]
-        return self._bend(area)
+        return self._bend(area, span)
 
-    @property
-    def motion(self) -> Floats:
-        """The same of the change of ground speed."""
-        return self._bend(self.speed)
+    def unmoved(self, force: Floats, span: float = LONG) -> Floats:
+        """The same of a force (n + 1,) over the mass, less the change of ground speed."""
+        return self.shift(force, span) - self._bend(self.speed, span)
 
-    def _bend(self, values: Floats) -> Floats:
-        """The slope of values (n + 1,) over `LONG` after each instant less that before it."""
-        at = [np.interp(self.middle + k * LONG, self.time, values) for k in (-1, 0, 1)]
-        return np.asarray((at[2] - 2 * at[1] + at[0]) / LONG)
+    def _bend(self, values: Floats, span: float) -> Floats:
+        """The slope of values (n + 1,) over ``span`` after each instant less that before it."""
+        at = [np.interp(self.middle + k * span, self.time, values) for k in (-1, 0, 1)]
+        return np.asarray((at[2] - 2 * at[1] + at[0]) / span)
 
 
 def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
@@ -106,8 +106,8 @@ def _unanswered(
     """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with; ``axles``: the torques of each."""
     if any(np.isfinite(part).sum() < 2 for part in (*parts.values(), climb)):
         return []
-    thrust = np.sum([filled(drive.time, part) for part in parts.values()], axis=0)
-    left = drive.shift(thrust - filled(drive.time, climb)) - drive.motion
+    force = np.sum([filled(drive.time, part) for part in parts.values()], axis=0) - filled(drive.time, climb)
+    left = drive.unmoved(force)
     spread = MAD_TO_SD * median(np.abs(left[drive.inside]))
     least = min(
         max(_LEAST * STANDARD_GRAVITY, _BEYOND * spread), max(PULL * STANDARD_GRAVITY, 2 * _BEYOND * spread)
@@ -121,6 +121,7 @@ def _unanswered(
             leaps[name][alone & (np.abs(apart - leaps[name]) > _HALF * np.abs(leaps[name]))] = 0.0
     leap = np.sum(list(leaps.values()), axis=0)
     rows = drive.inside & (np.abs(leap) > least) & (np.abs(left - leap) < _REST * np.abs(leap))
+    rows &= np.abs(drive.unmoved(force, _SOON) - leap) < _HALF * np.abs(leap)
     found: dict[tuple[str, ...], list[int]] = {}
     for k in np.flatnonzero(rows):
         found.setdefault(tuple(name for name in parts if leaps[name][k]), []).append(int(k))

@@ -136,6 +136,12 @@ class _Log:
     def means(self) -> Means | None:
         return means_of(self.rows, self.any_vehicle if self.knows_wheels else None)
 
+    @property
+    def means_of_even_torques(self) -> Means | None:
+        """The same without thrusts where a torque is off beside its axle's other one: so is their sum."""
+        means = self.means
+        return means and (replace(means, thrusts={}) if self.found("uneven torques") else means)
+
     @cached_property
     def courses(self) -> Courses | None:
         return Courses.of(self.rows, self.vehicle if self.knows_wheels else None)
@@ -157,7 +163,7 @@ _WAY = (*_TIME, "against")
 """and takes it that rims and ground go one way."""
 _SPEEDS = (*_WAY, "rescaled", "sides", "rims", "free axles")
 _COURSES = (*_SPEEDS, "positions")
-_FORCES = (*_WAY, "signs", "motion", "acceleration", "zeros", "leaps")
+_FORCES = (*_WAY, "signs", "uneven torques", "motion", "acceleration", "zeros", "leaps")
 
 _EACH = (
     Check("clock", lambda log: clock_warnings(log.whole, log.vehicle)),
@@ -202,7 +208,7 @@ _EACH = (
     Check("signs", lambda log: sign_warnings(log.whole, log.vehicle), _WAY),
     Check(
         "motion",
-        lambda log: motion_warnings(log.rows, log.any_vehicle, log.means),
+        lambda log: motion_warnings(log.rows, log.any_vehicle, log.means_of_even_torques),
         (*_WAY, "signs"),
         needs_wheels=False,
     ),
