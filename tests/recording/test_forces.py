@@ -135,6 +135,15 @@ def test_a_torque_of_a_wrong_sign_is_named_alone() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_a_cell_with_nothing_towed_has_no_scale(seed: int) -> None:
+    """It shows noise, with which no thrust goes: 'check the scale of drawbar_force' was said of right calibration drives."""
+    columns = drive(seed)
+    rigid = {n: v - RADIUS * columns["drawbar_force"] / 4 * ("torque" in n) for n, v in columns.items()}
+    noise = np.random.default_rng(seed).normal(0, 0.004 * MASS * G, len(columns["time"]))
+    assert notes(rigid | {"drawbar_force": noise}, machine()) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_torques_in_pound_feet_are_named_where_nothing_is_towed(seed: int) -> None:
     """Given as N m they are .74 of what starts and stops need. Too large ones may pull a trailer that is not in the log."""
     columns = drive(seed)

@@ -31,7 +31,7 @@ _LEAST = 40.0  # s of driving: in 22 s one start outweighs all blocks (a right l
 _BLOCKS = 12  # for the jackknife
 _STARTS = 2.5  # blocks among which the rims' change is spread, by its squares: a start or two have no scatter
 _SURE = 3.0  # standard errors
-_ALIKE = 0.5  # correlation of ground's and rims' rates: below it no start or stop stands out
+_ALIKE = 0.5  # correlation of ground's and rims' rates, of a pull with that just before and after: below it nothing stands out of noise
 _ACCELERATION = 1.8  # against both the ground's and the rims' rate
 _FORCE = 1.3  # an uncalibrated torque, an estimated mass
 
@@ -60,13 +60,15 @@ _RIGHT = Range(1.0, 1.0, 1.0)
 @dataclass(frozen=True)
 class Courses:
     """Courses (n,) of a drive without what changes slowly: ``rims``: their rate; ``change``: that of the ground speed, with the climb; the
-    accelerometer's ``shown``; ``thrust`` and ``pull`` over the mass [m/s²], None where the log lacks them."""
+    accelerometer's ``shown``; ``thrust`` and ``pull`` over the mass [m/s²], None where the log lacks them; ``beside``: the pull just before
+    and after, whose noise is another: the instrument of its slope. None where a cell shows but noise: nothing is towed."""
 
     rims: Floats
     change: Floats
     shown: Floats | None
     thrust: Floats | None
     pull: Floats | None
+    beside: Floats | None
 
     @classmethod
     def of(cls, recording: Recording, vehicle: Vehicle | None) -> Courses | None:
@@ -84,8 +86,8 @@ class Courses:
         if 2 * step > _CALM:
             return None
 
-        def at(name: str) -> Floats:
-            return np.interp(points, time, filled(time, channels[name]))
+        def at(name: str, shift: float = 0.0) -> Floats:
+            return np.interp(points + shift, time, filled(time, channels[name]))
 
         def calm(values: Floats) -> Floats:
             return smooth(values, _CALM, step)
@@ -114,7 +116,7 @@ class Courses:
         shown = None
         if _known(recording, "acceleration_x") and not _is_dead(channels["acceleration_x"]):
             shown = quick(calm(at("acceleration_x")))
-        thrust = pull = None
+        thrust = pull = beside = None
         torques = [f"drive_torque_{w}" for w in radii]
         if vehicle is not None and torques and _known(recording, *torques):
             spun = sum(
@@ -126,16 +128,23 @@ class Courses:
             force = calm(np.sum([at(f"drive_torque_{w}") / r for w, r in radii.items()], axis=0))
             thrust = quick((force - spun * rate) / vehicle.mass)
             if _known(recording, "drawbar_force"):
+                apart = _CALM + 2 * step  # such means share no sample
                 pull = quick(calm(at("drawbar_force")) / vehicle.mass)
-        return cls(quick(rate), quick(change), shown, thrust, pull)
+                near = at("drawbar_force", -apart) + at("drawbar_force", apart)
+                beside = quick(calm(near) / 2 / vehicle.mass)
+                if not _correlation(pull, beside) > _ALIKE:
+                    beside = None
+        return cls(quick(rate), quick(change), shown, thrust, pull, beside)
 
-    def slopes(self, y: Floats, x: Floats, *beside: Floats) -> list[Range]:
-        """y (n,) over the acceleration x (n,) that the rims command, and over each of ``beside``; of what is not known 1."""
+    def slopes(self, y: Floats, x: Floats, *beside: tuple[Floats, Floats]) -> list[Range]:
+        """y (n,) over the acceleration x (n,) that the rims command, and over each course of ``beside``, given with its instrument;
+        of what is not known 1."""
         unknown = [_RIGHT] * (1 + len(beside))
-        if not float(np.corrcoef(self.rims, self.change)[0, 1]) > _ALIKE:
+        if not _correlation(self.rims, self.change) > _ALIKE:
             return unknown
         one = np.ones(len(y))
-        inside, outside = [self.rims, *beside, one], [x, *beside, one, y]
+        courses, instruments = zip((x, self.rims), *beside, (one, one), strict=True)
+        inside, outside = instruments, (*courses, y)
         block = np.arange(len(y)) * _BLOCKS // len(y)
         sums = np.array(
             [
@@ -152,7 +161,7 @@ class Courses:
             return unknown
         fits = np.linalg.solve(tables[..., :-1], tables[..., -1:])[..., 0]
         errors = _SURE * np.sqrt((_BLOCKS - 1) * np.var(fits[1:], axis=0))
-        return [Range(v, v - e, v + e) for v, e in zip(fits[0], errors, strict=True)][: 1 + len(beside)]
+        return [Range(v, v - e, v + e) for v, e in zip(fits[0], errors, strict=True)][: len(unknown)]
 
 
 def acceleration_warnings(courses: Courses | None) -> list[str]:
@@ -183,11 +192,12 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     # a receiver filters, and its speed is late
     change = courses.rims if courses.shown is None else courses.shown
     scale = "the torques' scale (at the wheel, not at the motor: the gear ratio counts) and the wheel radius"
-    if courses.pull is None:
+    if courses.pull is None or courses.beside is None:
         fits = [courses.slopes(courses.thrust, own)[0] for own in (change, courses.change)]
-        little = all(mass.high < 1 / _FORCE for mass in fits)
-        return [_imbalance(fits[0], "", [scale, "the mass"], vehicle)] if little else []
-    mass, pull = courses.slopes(courses.thrust, change, courses.pull)
+        off = all(mass.high < 1 / _FORCE for mass in fits)
+        off |= courses.pull is not None and all(mass.low > _FORCE for mass in fits)
+        return [_imbalance(fits[0], "", [scale, "the mass"], vehicle)] if off else []
+    mass, pull = courses.slopes(courses.thrust, change, (courses.pull, courses.beside))
     if not (mass.is_off(_FORCE) or pull.is_off(_FORCE)):
         return []
     causes = []
@@ -213,6 +223,11 @@ def _imbalance(mass: Range, beside: str, causes: list[str], vehicle: Vehicle) ->
 
 def _known(recording: Recording, *names: str) -> bool:
     return all(np.isfinite(recording.channels.get(name, np.nan)).sum() > 1 for name in names)
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    """The correlation of two courses (n,), 0 where one never changes."""
+    return float(np.corrcoef(a, b)[0, 1]) if np.ptp(a) and np.ptp(b) else 0.0
 
 
 def _is_dead(values: Floats) -> bool:
