@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
 from pathlib import Path
 from typing import Any
 
@@ -169,3 +170,32 @@ def test_the_loupe_shows_the_picture_while_a_line_is_digitised(
     )
     assert sides[0][1] > 200  # white on the left
     assert sides[1][0] > 150 > sides[1][1]  # red on the right
+
+
+def test_a_curve_set_by_hand_outlasts_a_reload_and_who_comes_back_finds_it_once(
+    page: Any, served: Served, folder: Path
+) -> None:
+    """A reload lost it, and each way back to the page's address added the library's curves once more."""
+    bins = "() => window.terragripFit.state.soils.map((soil) => soil.bins.length)"
+    page.goto(f"{served.url}/#/fit?path=soils.json")
+    page.wait_for_selector("#soil-list li")
+    before = page.evaluate(bins)
+    page.fill("#field-a", "0,7")
+    page.press("#field-a", "Tab")
+    page.reload()
+    page.wait_for_function("n => (window.terragripFit?.state.soils[0]?.bins.length ?? 0) === n", arg=before[0])
+    assert page.input_value("#field-a") == "0.7"
+    page.goto(f"{served.url}/#/live")
+    page.wait_for_selector("#alarms")
+    page.go_back()
+    page.wait_for_selector("#soil-list li")
+    assert page.evaluate(bins) == before
+    assert page.locator("#curve-list li").count() == 2  # the prototype and the library's
+    page.wait_for_load_state("networkidle")  # else the page, still opening, shows the new file
+    library = json.loads((folder / "soils.json").read_text())
+    name = next(iter(library["soils"]))
+    library["soils"][name]["bins"] = library["soils"][name]["bins"][1:]
+    (folder / "soils.json").write_text(json.dumps(library))
+    page.wait_for_selector(".note:has-text('soils.json was replaced: reloaded')")
+    page.wait_for_function(f"n => ({bins})()[0] === n", arg=before[0] - 1)
+    assert page.input_value("#field-a") == "0.7"

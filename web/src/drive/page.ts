@@ -24,7 +24,7 @@ import { layouts, type Layout } from "./layouts";
 import { legendOf } from "./legend";
 import { address, read, written, type View } from "./link";
 import { OTHERS, overlayChooser, panelsOfAll } from "./overlay";
-import { described, type Sample } from "./sample";
+import { Picked } from "./picked";
 import { tableOf } from "./table";
 import { Views } from "./views";
 import { during, type Run } from "./run";
@@ -34,7 +34,6 @@ const KEY = "terragrip-drive-panels";
 const HINT = "Drag or shift+wheel zooms, arrow keys pan, double click shows all.";
 const HINT_NARROW = "Two fingers zoom, one pans.";
 const NARROW = matchMedia("(max-width: 600px)"); // as in the style sheet
-const CLICK = "Click a chart to see all values at that instant, and why µ changed. ◀ ▶ step through samples.";
 
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
@@ -55,7 +54,7 @@ export const page: Page = (main, { notices, query }) => {
   const back = h("button", { type: "button", id: "back", disabled: true, click: () => views.back(), title: "Previous time range (Backspace)" }, "Back");
   const forward = h("button", { type: "button", id: "forward", disabled: true, click: () => views.forward(), "aria-label": "Next time range" }, "↷");
   const advice = new AdvicePanel();
-  const details = h("section", { class: "sample", "aria-label": "Sample", "aria-live": "polite" });
+  const picked = new Picked(charts, across, () => (run ? { path, run, from: layers[0]?.way.time(charts.range[0]) ?? run.start } : null), () => remember());
   const over = h("select", { id: "over", "aria-label": "Horizontal axis" }, (Object.keys(AXES) as Axis[]).map((name) => h("option", { value: name }, `Over ${AXES[name].title}`)));
   const overlay = overlayChooser((paths) => lay(paths));
   let layers: Layer[] = []; // the run and those over it
@@ -67,7 +66,6 @@ export const page: Page = (main, { notices, query }) => {
   let runs = new Map<string, string>(); // and of all estimates
   let chosen: string[] = []; // wheels
   let shown: string[] = asked.panels ?? JSON.parse(localStorage.getItem(KEY) ?? "null") ?? FIRST;
-  let picked: number | null = null;
   const kept = keptFormulas();
   const formulas = new FormulaList([...kept.filter(({ name }) => !asked.formulas.some((one) => one.name === name)), ...asked.formulas], () => layers[0], (made) => {
     if (made && !shown.includes(keyOf(made))) shown = [...shown, keyOf(made)];
@@ -75,8 +73,6 @@ export const page: Page = (main, { notices, query }) => {
   });
   let linked: View | null = asked; // until its run is open
   charts.uprights = { ...asked.uprights };
-  let asking = false;
-  let sample: Sample | null = null; // the picked one
 
   const tools = h(
     "div",
@@ -98,22 +94,13 @@ export const page: Page = (main, { notices, query }) => {
       across.element,
       list.element,
       advice.element,
-      h(
-        "div",
-        { class: "row" },
-        h("h2", {}, "Sample"),
-        h("span", { class: "spring" }),
-        h("button", { type: "button", click: () => stepSample(-1), "aria-label": "Previous sample" }, "◀"),
-        h("button", { type: "button", click: () => stepSample(1), "aria-label": "Next sample" }, "▶"),
-      ),
-      details,
+      picked.element,
     ),
   );
-  fill(details, h("p", { class: "hint" }, CLICK));
 
   function zoom(factor: number): void {
     const [low, high] = charts.range;
-    const at = picked === null ? NaN : (layers[0]?.way.place(picked) ?? NaN);
+    const at = picked.time === null ? NaN : (layers[0]?.way.place(picked.time) ?? NaN);
     charts.zoom(zoomed(charts.range, at > low && at < high ? at : (low + high) / 2, factor));
   }
 
@@ -122,7 +109,7 @@ export const page: Page = (main, { notices, query }) => {
     address("drive", () => {
       const { pair } = across;
       const used = formulas.all.filter((one) => shown.includes(keyOf(one)) || pair?.includes(`=${one.text}`));
-      return written({ path, range: charts.isWhole ? null : charts.range, wheels: chosen, panels: shown, at: picked, uprights: charts.uprights, axis, others, formulas: used, pair });
+      return written({ path, range: charts.isWhole ? null : charts.range, wheels: chosen, panels: shown, at: picked.time, uprights: charts.uprights, axis, others, formulas: used, pair });
     });
   }
 
@@ -207,7 +194,7 @@ export const page: Page = (main, { notices, query }) => {
     const about = Math.max(event.end - event.start, 4);
     const way = layers[0]?.way;
     if (way) charts.zoom([way.place(event.start - 0.5 * about), way.place(event.end + 0.5 * about)]);
-    await pick(event.start);
+    await picked.pick(event.start);
   }
 
   function draw(): void {
@@ -261,16 +248,9 @@ export const page: Page = (main, { notices, query }) => {
     if (link?.range) charts.zoom(link.range);
     else charts.follow();
     if (!again) views.start(charts.range);
-    if (link?.at !== null && link?.at !== undefined) void pick(link.at);
-    else if (!again) forgetSample();
+    if (link?.at !== null && link?.at !== undefined) void picked.pick(link.at);
+    else if (!again) picked.forget();
     across.draw(charts.range);
-  }
-
-  function forgetSample(): void {
-    picked = sample = null;
-    charts.mark(null);
-    plane.at(null);
-    fill(details, h("p", { class: "hint" }, CLICK));
   }
 
   /** No run is shown, and why. */
@@ -279,45 +259,12 @@ export const page: Page = (main, { notices, query }) => {
     run = null;
     layers = [];
     charts.clear(why);
-    forgetSample();
+    picked.forget();
     list.show(null);
     advice.of("", "");
     for (const one of [legend, wheels]) fill(one);
     across.show([], [], null);
     readout.value = "";
-  }
-
-  async function pick(time: number): Promise<void> {
-    if (asking) return;
-    asking = true;
-    const found = await tried(() => get<Sample>("drive/sample", { path, time, version: run?.version }));
-    asking = false;
-    if (!found) return;
-    picked = found.time;
-    charts.mark(picked);
-    remember();
-    sample = found;
-    showSample(found);
-  }
-
-  function stepSample(by: number): void {
-    if (!run) return;
-    const period = (run.end - run.start) / Math.max(run.rows - 1, 1);
-    void pick((picked ?? layers[0]?.way.time(charts.range[0]) ?? run.start) + by * period);
-  }
-
-  function showSample(found: Sample): void {
-    const { wheel } = across;
-    const of = (name: string): number => found.values[name] ?? NaN;
-    plane.at({
-      slip: of(`slip_${wheel}`),
-      adhesion: of(`adhesion_${wheel}`),
-      slip_std: of(`slip_${wheel}_std`),
-      adhesion_std: of(`adhesion_${wheel}_std`),
-      a: of("curve_a"),
-      a_std: of("curve_a_std"),
-    });
-    fill(details, described(found, during(run?.events, found.time), run));
   }
 
   function hover(time: number | null): void {
@@ -336,7 +283,7 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   charts.onCursor = hover;
-  charts.onPick = (time) => void pick(time);
+  charts.onPick = (time) => void picked.pick(time);
   charts.onUpright = remember;
   plane.onPoint = (time) => charts.point(time, true);
   charts.onRange = (range) => {
@@ -354,7 +301,7 @@ export const page: Page = (main, { notices, query }) => {
   charts.onReplaced = () => void reload();
   across.onPair = () => {
     remember();
-    if (picked !== null) void pick(picked);
+    picked.draw(); // by another wheel
   };
   over.addEventListener("change", () => void along(over.value as Axis).then(remember));
 
@@ -390,7 +337,7 @@ export const page: Page = (main, { notices, query }) => {
     onUnits(() => {
       draw();
       across.show(layers, formulas.all, null);
-      if (sample) showSample(sample);
+      picked.draw();
     }),
   ];
   void reload();

@@ -146,27 +146,51 @@ export class ListPanel {
       { id: "bins-by", title: "By pull, as terragrip soils does: noise of slip does not move a sample into another bin. By slip: as in most papers." },
       (["pull", "slip"] as const).map((by) => h("option", { value: by, selected: by === this.state.by }, by === "pull" ? "the vehicle's pull" : "slip")),
     );
-    choice.addEventListener("change", () => void this.rebin(choice.value === "slip" ? "slip" : "pull"));
+    choice.addEventListener("change", () => {
+      this.state.by = choice.value === "slip" ? "slip" : "pull";
+      void this.reread(this.state.soils.filter(({ path }) => path.endsWith(".parquet"))).then(() => document.getElementById("bins-by")?.focus());
+    });
     return h("div", { class: "field" }, h("label", { for: "bins-by" }, "Bins by"), choice);
   }
 
-  /** Compute the bins of all estimates again. */
-  private async rebin(by: "pull" | "slip"): Promise<void> {
-    this.state.by = by;
-    for (const path of new Set(this.state.soils.map((soil) => soil.path).filter((one) => one.endsWith(".parquet")))) {
-      const served = await tried(() => get<Served[]>("soils", { path, by }));
-      for (const one of served ?? []) {
-        const soil = this.state.soils.find((other) => other.key === `${path}#${one.name}`);
-        if (soil) Object.assign(soil, { bins: one.bins ?? [], note: one.note ?? "" });
+  /** Follow files that were replaced: a fit is over what they have now. Their curves stay as they are here. */
+  async renew(): Promise<void> {
+    for (const path of Object.keys(this.state.opened)) {
+      if (this.state.opened[path] === this.version(path) || !this.files.some((file) => file.path === path)) continue;
+      this.state.opened[path] = this.version(path);
+      note(`${path} was replaced: reloaded`);
+      await this.reread(this.state.soils.filter((soil) => soil.path === path));
+    }
+  }
+
+  /** Read points and bins again: binned otherwise, of a file that was replaced, or after the page was reloaded. */
+  async reread(soils = this.state.soils.filter(({ bins, points }) => !bins.length && !points.slip.length)): Promise<void> {
+    for (const path of new Set(soils.map((soil) => soil.path))) {
+      const served = await tried(() => get<Served[]>("soils", { path, by: this.state.by }));
+      for (const soil of served ? soils.filter((one) => one.path === path) : []) {
+        const now = served?.find((one) => soil.key === `${path}#${one.name}`);
+        if (now) Object.assign(soil, { bins: now.bins ?? [], points: now.points ?? soil.points, note: now.note ?? "" });
+        else this.state.remove(soil);
       }
     }
-    this.state.changed("all");
-    document.getElementById("bins-by")?.focus();
+    if (soils.length) this.state.changed("all");
+  }
+
+  private version(path: string): string {
+    const file = this.files.find((one) => one.path === path);
+    return `${file?.size} ${file?.modified}`;
+  }
+
+  /** Whether what a file has is on the page, changed by hand or not: who comes back finds it as it was left. */
+  isOpen(path: string): boolean {
+    const { opened, soils, kept } = this.state;
+    return opened[path] === this.version(path) && [...soils.map((soil) => soil.key), ...kept.curves.map((curve) => curve.data)].some((key) => key.startsWith(`${path}#`));
   }
 
   async open(path: string): Promise<void> {
     if (!path) return;
     const served = await tried(() => get<Served[]>("soils", { path, by: this.state.by }));
+    if (served) this.state.opened[path] = this.version(path);
     const curves: Curve[] = [];
     for (const one of served ?? []) {
       const key = `${path}#${one.name}`;

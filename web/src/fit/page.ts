@@ -74,11 +74,13 @@ export const page: Page = (main, { notices, query }) => {
 
   const hover = (event: DragEvent): void => event.preventDefault();
 
+  let started = false;
   const reload = oneAtATime(async () => {
     const folder = await tried(() => get<{ items: Item[] }>("folder"));
     if (!folder) return;
     pictures.load(folder.items);
     await list.load(folder.items);
+    if (started) await list.renew();
   });
 
   async function start(): Promise<void> {
@@ -89,8 +91,12 @@ export const page: Page = (main, { notices, query }) => {
     }
     state.changed("all");
     await reload();
+    await list.reread();
+    await pictures.reread();
     const path = query.get("path");
-    if (path) await list.open(path);
+    if (path && !list.isOpen(path)) await list.open(path);
+    started = true;
+    await list.renew();
     plot.fit();
   }
 
@@ -98,6 +104,8 @@ export const page: Page = (main, { notices, query }) => {
     if (notice.kind === "folder") void reload();
     if (notice.kind === "picture" && notice.by !== ME) void pictures.renewed(notice.path);
   });
+  const hide = (): void => state.leave();
+  addEventListener("pagehide", hide);
   addEventListener("keydown", key);
   addEventListener("paste", paste);
   main.addEventListener("drop", drop);
@@ -107,6 +115,7 @@ export const page: Page = (main, { notices, query }) => {
   Object.assign(window, { terragripFit: { plot, state, at, mapOf, residuals } });
   return () => {
     state.leave();
+    removeEventListener("pagehide", hide);
     forget();
     plot.close();
     residuals.close();

@@ -87,6 +87,16 @@ export class PicturesPanel {
     this.shown();
   }
 
+  /** Load the pictures again, after the page was reloaded. */
+  async reread(): Promise<void> {
+    for (const path of Object.keys(this.state.kept.pictures)) {
+      if (this.state.images.has(path)) continue;
+      await this.image(path);
+      await this.renewed(path);
+      this.state.changed("pictures");
+    }
+  }
+
   /** Another page changed a calibration: use it unless it is ours already. */
   async renewed(path: string): Promise<void> {
     const mine = this.state.kept.pictures[path];

@@ -96,8 +96,10 @@ interface Left {
   future: string[];
   settled: string;
   colors: number;
+  opened: Record<string, string>;
 }
 
+const KEY = "terragrip-fit";
 let left: Left | null = null;
 
 export class State {
@@ -111,6 +113,8 @@ export class State {
   /** Samples of curves by their id, and of what their fits found by `fit <id>`. */
   samples = new Sampler(() => this.changed("curve"));
   kept: Kept = { curves: [], active: 0, pictures: {} };
+  /** Files whose soils and curves were added, and how they were then. */
+  opened: Record<string, string> = {};
   private past: string[] = [];
   private future: string[] = [];
   private settled = JSON.stringify(this.kept);
@@ -159,17 +163,23 @@ export class State {
     return true;
   }
 
-  /** Keep what is shown for the next time that the page opens. */
+  /** Keep what is shown for the next time that the page opens; over a reload without undo, and without what the folder has. */
   leave(): void {
-    const { kept, soils, images, target, by, past, future, settled, colors } = this;
-    left = { kept, soils, images, target, by, past, future, settled, colors };
+    const { kept, soils, images, target, by, past, future, settled, colors, opened } = this;
+    left = { kept, soils, images, target, by, past, future, settled, colors, opened };
+    const bare = soils.map((soil) => ({ ...soil, points: { slip: [], adhesion: [] }, bins: [] }));
+    try {
+      sessionStorage.setItem(KEY, JSON.stringify({ kept, soils: bare, target, by, settled: JSON.stringify(kept), colors, opened }));
+    } catch {
+      sessionStorage.removeItem(KEY); // it is full: what is older must not come back
+    }
   }
 
   /** Restore the last state; false where there is none. */
   takeUp(): boolean {
-    if (!left) return false;
-    Object.assign(this, left);
-    return true;
+    const last = left ?? (JSON.parse(sessionStorage.getItem(KEY) ?? "null") as Partial<Left> | null);
+    if (last) Object.assign(this, last);
+    return last !== null;
   }
 
   get canUndo(): boolean {
