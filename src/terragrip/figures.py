@@ -6,6 +6,7 @@ The palette is Okabe and Ito's (jfly.uni-koeln.de/color).
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,15 @@ ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
 BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
 LINES = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, MUTED, YELLOW)
 """Colours of lines beside each other, in this order."""
+
+SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
+"""None of them is the colour of a source."""
+PART_COLORS = {"work": GREEN, "headland": ORANGE, "road": SKY, "standing": PURPLE, "the drive": BLUE}
+"""Of what a machine did (field_work.py)."""
+_SPARE_COLORS = (BLUE, VERMILLION, "#8d4b35", "#7f20df", "#cab472", "#a3bfdc", "#234e5c", "#72ca9e")
+"""Each as far as can be from those before and from the soils', to eyes of all kinds (a test sees with them). Beyond them hues are made,
+a golden angle apart."""
+_GOLDEN = 0.618034
 
 _RC: Any = {
     "figure.facecolor": "none",
@@ -99,3 +109,26 @@ def _shown() -> type[Figure]:
             return buffer.getvalue()
 
     return Shown
+
+
+def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
+    """The colour of a soil: fixed for the paper's five, for others one of its own by its place among `soils` in order of names: each
+    figure has an order of its own."""
+    known = SOIL_COLORS | PART_COLORS
+    if soil in known:
+        return known[soil]
+    others = sorted({name for name in soils if name not in known})
+    if soil not in others:
+        return MUTED
+    place = others.index(soil)
+    if place < len(_SPARE_COLORS):
+        return _SPARE_COLORS[place]
+    return _made(place - len(_SPARE_COLORS))
+
+
+def _made(number: int) -> str:
+    """One of any number of colours, as #rrggbb: hues a golden angle apart, by turns dark and light."""
+    import colorsys
+
+    red, green, blue = colorsys.hls_to_rgb((0.07 + _GOLDEN * number) % 1.0, 0.62 if number % 2 else 0.38, 0.6)
+    return f"#{round(255 * red):02x}{round(255 * green):02x}{round(255 * blue):02x}"

@@ -183,7 +183,9 @@ def test_a_curve_set_by_hand_outlasts_a_reload_and_who_comes_back_finds_it_once(
     page.fill("#field-a", "0,7")
     page.press("#field-a", "Tab")
     page.reload()
-    page.wait_for_function("n => (window.terragripFit?.state.soils[0]?.bins.length ?? 0) === n", arg=before[0])
+    page.wait_for_function(
+        "n => (window.terragripFit?.state.soils[0]?.bins.length ?? 0) === n", arg=before[0]
+    )
     assert page.input_value("#field-a") == "0.7"
     page.goto(f"{served.url}/#/live")
     page.wait_for_selector("#alarms")

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.figures import LINES, MUTED, ORANGE, notebook_figure, styled
+from terragrip.figures import INK, MUTED, ORANGE, notebook_figure, soil_color, styled
 from terragrip.ground.span import Span
 from terragrip.html import figure_of, html_notes, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from terragrip.ground.result import Ground
@@ -46,28 +47,37 @@ def html_of(ground: Ground) -> str:
     return sections + (events if ground.events else "") + html_notes(ground.notes)
 
 
-def plot(ground: Ground) -> Figure:
-    """Probabilities of the soils over time, changes with their standard deviations, events below."""
-    figure = notebook_figure(9.6, 3.8)
+def draw_soils(axes: Axes, ground: Ground) -> None:
+    """The probabilities of the soils over time, stacked, "unknown" on top, each with its name for a legend; the changes as lines, as dark
+    as they are probable, with their standard deviations."""
     timeline = ground.timeline
+    soils = sorted(timeline.names, key=lambda name: name == "unknown")
+    if len(timeline.time):
+        layers = timeline.probabilities[:, [timeline.names.index(name) for name in soils]].T
+        colors = [INK if name == "unknown" else soil_color(name, soils) for name in soils]
+        axes.stackplot(
+            timeline.time, layers, labels=soils, colors=colors, alpha=0.9, linewidth=0, step="post"
+        )
+    for change in ground.changes:
+        dark = max(min(change.probability, 1.0), 0.1)
+        axes.axvline(change.time, color=INK, linewidth=1.0, alpha=dark)
+        axes.axvspan(
+            change.time - change.std, change.time + change.std, color=INK, alpha=0.2 * dark, linewidth=0
+        )
+        axes.plot([change.time], [1.0], "v", color=MUTED, markersize=4, clip_on=False)
+    axes.set_ylim(0, 1)
+    axes.set_ylabel("probability")
+    axes.grid(visible=False)
+
+
+def plot(ground: Ground) -> Figure:
+    """The soils over time with the changes (`draw_soils`), events below."""
+    figure = notebook_figure(9.6, 3.8)
     with styled():
         axes, below = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
-        if len(timeline.time):
-            layers = timeline.probabilities.T
-            colors: list[Any] = [
-                MUTED if name == "unknown" else LINES[k % len(LINES)] for k, name in enumerate(timeline.names)
-            ]
-            axes.stackplot(
-                timeline.time, layers, labels=timeline.names, colors=colors, alpha=0.75, step="post"
-            )
+        draw_soils(axes, ground)
+        if len(ground.timeline.time):
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        for change in ground.changes:
-            axes.axvline(change.time, color="black", linewidth=1.0)
-            axes.axvspan(
-                change.time - change.std, change.time + change.std, color="black", alpha=0.15, linewidth=0
-            )
-        axes.set_ylim(0, 1)
-        axes.set_ylabel("probability [–]")
         axes.set_title("soil; lines: changes ± SD")
         kinds = sorted({event.kind for event in ground.events})
         for event in ground.events:

@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.ground.views import draw_soils
 from terragrip.report.clock import Clock
 from terragrip.report.operating_points import Cross, draw_crosses
 from terragrip.report.page import Picture, Section, Table, names, number, percent
 from terragrip.report.runs import label_stretches
-from terragrip.report.style import INK, MUTED, new_figure, soil_color, styled, to_svg
+from terragrip.report.style import new_figure, styled, to_svg
 from terragrip.report.timeline import soil_strip
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from terragrip.ground.events import Event
     from terragrip.ground.result import Ground, Timeline
 
@@ -64,7 +63,7 @@ def recognised(
             f"ground-{_stem(ground.run)}",
             draw_probabilities(ground, clocks.get(ground.run, Clock())),
             f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground found in the estimates, "
-            f"as dark as they are probable.{strip} Where two soils look alike, they share the probability.",
+            f"as dark as they are probable, with their standard deviations.{strip} Where two soils look alike, they share the probability.",
             f"Probabilities of soils over time in {ground.run}",
         )
         content.append(picture)
@@ -251,52 +250,21 @@ def confusion(timelines: Iterable[Timeline]) -> tuple[Table, str] | None:
 
 
 def draw_probabilities(ground: Ground, clock: Clock = Clock()) -> str:  # noqa: B008
-    """An SVG: stacked probabilities over time, changes as lines, the label's strip above."""
+    """An SVG: the soils over time as `ground.views` draws them, the label's strip above."""
     timeline = ground.timeline
-    soils = (
-        *(name for name in timeline.names if name != "unknown"),
-        *(["unknown"] * ("unknown" in timeline.names)),
-    )
     figure = new_figure(9.6, 3.1)
     with styled():
-        from matplotlib.patches import Patch
-
         plot = figure.subplots()
-        lower = np.zeros(len(timeline.time))
-        for name in soils:
-            share = timeline.probabilities[:, timeline.names.index(name)]
-            color, alpha = (INK, 0.85) if name == "unknown" else (soil_color(name, soils), 0.9)
-            plot.fill_between(
-                timeline.time, lower, lower + share, step="post", color=color, alpha=alpha, linewidth=0
-            )
-            lower = lower + share
-        _mark_changes(plot, ground)
+        draw_soils(plot, ground)
         soil_strip(
             plot, timeline.time, timeline.label, tuple(s for s, _, _ in label_stretches(timeline.label))
         )
-        plot.set_ylim(0, 1)
         plot.set_xlim(float(timeline.time[0]), float(timeline.time[-1]))
         clock.mark(plot)
-        plot.set_ylabel("probability")
-        plot.grid(visible=False)
-        handles = [
-            Patch(color=INK if name == "unknown" else soil_color(name, soils), label=name) for name in soils
-        ]
         plot.legend(
-            handles=handles,
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.10),
-            ncols=8,
-            borderaxespad=0.0,
-            handlelength=1.6,
+            loc="lower left", bbox_to_anchor=(0.0, 1.10), ncols=8, borderaxespad=0.0, handlelength=1.6
         )
         return to_svg(figure)
-
-
-def _mark_changes(plot: Axes, ground: Ground) -> None:
-    for change in ground.changes:
-        plot.axvline(change.time, color=INK, linewidth=1.0, alpha=max(min(change.probability, 1.0), 0.1))
-        plot.plot([change.time], [1.0], "v", color=MUTED, markersize=4, clip_on=False)
 
 
 def _sensor(measured: object) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from terragrip.figures import (
@@ -16,11 +15,14 @@ from terragrip.figures import (
     MUTED,
     ORANGE,
     PAPER,
+    PART_COLORS,
     PURPLE,
     SKY,
+    SOIL_COLORS,
     VERMILLION,
     YELLOW,
     new_figure,
+    soil_color,
     styled,
 )
 
@@ -36,11 +38,14 @@ __all__ = [
     "MUTED",
     "ORANGE",
     "PAPER",
+    "PART_COLORS",
     "PURPLE",
     "SKY",
+    "SOIL_COLORS",
     "VERMILLION",
     "YELLOW",
     "new_figure",
+    "soil_color",
     "styled",
 ]
 
@@ -49,15 +54,6 @@ _DARK, _LIGHT = "#000000", "#fdfdfd"
 
 MEASURED, ESTIMATED, TRUE = VERMILLION, BLUE, INK
 """Colours of the three sources of a value in every figure: the reference sensor, the estimate, the truth."""
-
-SOIL_COLORS = {"hard": MUTED, "fine": ORANGE, "wet": SKY, "coarse": PURPLE, "grass": GREEN}
-"""None of them is the colour of a source."""
-PART_COLORS = {"work": GREEN, "headland": ORANGE, "road": SKY, "standing": PURPLE, "the drive": BLUE}
-"""Of what a machine did (field_work.py)."""
-_SPARE_COLORS = (BLUE, VERMILLION, "#8d4b35", "#7f20df", "#cab472", "#a3bfdc", "#234e5c", "#72ca9e")
-"""Each as far as can be from those before and from the soils', to eyes of all kinds (a test sees with them). Beyond them hues are made,
-a golden angle apart."""
-_GOLDEN = 0.618034
 
 CSS_VARIABLES = {
     INK: "ink", MUTED: "muted", GRID: "grid", PAPER: "paper", ORANGE: "orange", SKY: "sky", GREEN: "green",
@@ -124,21 +120,6 @@ def in_page(svg: str, label: str, prefix: str) -> str:
     return body
 
 
-def soil_color(soil: str, soils: Sequence[str] = ()) -> str:
-    """The colour of a soil: fixed for the paper's five, for others one of its own by its place among `soils` in order of names: each
-    figure has an order of its own."""
-    known = SOIL_COLORS | PART_COLORS
-    if soil in known:
-        return known[soil]
-    others = sorted({name for name in soils if name not in known})
-    if soil not in others:
-        return MUTED
-    place = others.index(soil)
-    if place < len(_SPARE_COLORS):
-        return _SPARE_COLORS[place]
-    return _made(place - len(_SPARE_COLORS))
-
-
 def text_color(patch: str) -> str:
     """The colour of a text on a patch of a `soil_color`: what stands off more. A colour that follows the page's scheme is light in the
     dark one, as paper is dark there."""
@@ -153,11 +134,3 @@ def _luminance(color: str) -> float:
     coded = [int(color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in coded]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-def _made(number: int) -> str:
-    """One of any number of colours, as #rrggbb: hues a golden angle apart, by turns dark and light."""
-    import colorsys
-
-    red, green, blue = colorsys.hls_to_rgb((0.07 + _GOLDEN * number) % 1.0, 0.62 if number % 2 else 0.38, 0.6)
-    return f"#{round(255 * red):02x}{round(255 * green):02x}{round(255 * blue):02x}"
