@@ -13,7 +13,8 @@ import terragrip as tg
 from terragrip.arrays import Floats
 from terragrip.cli import main
 from terragrip.estimation import Estimates
-from terragrip.formats.recognition import Proposal, propose
+from terragrip.formats.channel_proposal import Proposal
+from terragrip.formats.recognition import propose
 from terragrip.formats.rim_units import ROTATION, SPEED
 from terragrip.simulation import families
 from terragrip.units import factor_to

@@ -11,7 +11,8 @@ import pytest
 from terragrip.errors import InputError
 from terragrip.formats import read
 from terragrip.formats.candidates import candidates_of, columns_of
-from terragrip.formats.recognition import Proposal, propose
+from terragrip.formats.channel_proposal import Proposal
+from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.vehicle import Vehicle
 

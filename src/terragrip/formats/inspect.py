@@ -14,10 +14,11 @@ import yaml
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
+from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.profile import Profile
 from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, profile_text, refusal
 from terragrip.formats.reading import read_log, recording_of
-from terragrip.formats.recognition import Proposal, Proposals, propose, silent
+from terragrip.formats.recognition import Proposals, propose, silent
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.signs import add_signs
 from terragrip.formats.spoilt import notes_on, numbers_of

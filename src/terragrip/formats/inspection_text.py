@@ -9,8 +9,8 @@ from terragrip.note_pages import with_page
 from terragrip.recording.schema import wheel_names_in
 
 if TYPE_CHECKING:
+    from terragrip.formats.channel_proposal import Proposal
     from terragrip.formats.inspect import ColumnSummary, Inspection, TimeSummary
-    from terragrip.formats.recognition import Proposal
 
 _HEAD = ("column", "unit", "count", "missing", "rate", "held", "noise", "min", "5 %", "median", "95 %", "max")
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import yaml
 
 from terragrip.errors import InputError
+from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.profile_parts import Source, matching
-from terragrip.formats.recognition import Proposal
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.table import LogTable
 from terragrip.formats.time_column import TimeColumn

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from terragrip.formats.recognition import Proposal, Proposals
+from terragrip.formats.channel_proposal import Proposal
+from terragrip.formats.recognition import Proposals
 from terragrip.recording import Recording
 from terragrip.recording.plausibility import wrong_signs
 from terragrip.recording.schema import split_channel

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from terragrip.formats.channel_proposal import Proposal
     from terragrip.formats.inspect import Inspection
     from terragrip.formats.outline import Outline
-    from terragrip.formats.recognition import Proposal
 
 TITLES = {
     "wheel_speed": "turning speed",

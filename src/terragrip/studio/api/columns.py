@@ -62,8 +62,8 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     """Write a profile beside its log; it must read that log."""
     from terragrip.files import replacing
     from terragrip.formats import Profile
+    from terragrip.formats.channel_proposal import Proposal
     from terragrip.formats.proposal import profile_text
-    from terragrip.formats.recognition import Proposal
     from terragrip.formats.time_column import TimeColumn
 
     log = studio.folder.file(wanted.log)
