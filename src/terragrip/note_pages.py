@@ -88,6 +88,7 @@ PAGES = (
     ("ends early, or is damaged", "formats#damaged-files-and-large-ones"),
     (", and was left out", "formats#damaged-files-and-large-ones"),
     ("what that part of the bag holds", "formats#ros-bags-and-mcap"),
+    ("may be one component of a velocity", "checks#units-scales-and-zeros"),
     ("The log has several machines", "formats#ros-bags-and-mcap"),
     ("cannot be read and were left out", "formats#damaged-files-and-large-ones"),
     ("No soil of the library fits", "ground#limits"),

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from drives import drive, robot
@@ -81,7 +82,6 @@ def same(found: Any, estimates: Estimates, rows: Any = slice(None), rtol: float 
 
 
 def test_parquet_says_what_its_columns_mean(estimates, tmp_path):
-    import pyarrow.parquet as pq
 
     estimates.write(tmp_path / "e.parquet")
     schema = pq.read_schema(tmp_path / "e.parquet")
@@ -358,4 +358,20 @@ def test_a_write_that_fails_leaves_nothing(estimates, tmp_path):
     for suffix in (".gpkg", ".geojson"):
         with pytest.raises(InputError, match=f"x{suffix}.*no row has a position"):
             nowhere.write(tmp_path / f"x{suffix}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_while_parquet_is_written_is_no_full_disk(estimates, tmp_path, monkeypatch):
+    """Arrow's complaint of a half-written row group came in place of Ctrl-C: 'cannot be written (Column 16 had ...); free space'."""
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    def complain(self):
+        raise OSError("Column 16 had 1048576 while previous column had 240000")
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", stop)
+    monkeypatch.setattr(pq.ParquetWriter, "close", complain)
+    with pytest.raises(KeyboardInterrupt):
+        estimates.write(tmp_path / "x.parquet")
     assert not list(tmp_path.iterdir())

@@ -492,6 +492,34 @@ def test_patterns_take_no_column_of_another_machine(foreign: pd.DataFrame) -> No
     assert not any("machines" in note for note in result.notes)
 
 
+def test_a_velocity_on_the_axes_of_a_map_is_named(foreign: pd.DataFrame) -> None:
+    """An odometry in its map's frame, driven north-east: its x alone was the ground speed, and slip .46 in place of .10."""
+    log = foreign.assign(**{"/vo.linear.x": 0.6 * foreign["kmh"], "/vo.linear.y": 0.8 * foreign["kmh"]})
+    channels = {"ground_speed": "*vo.linear.x", "wheel_speed_fl": "rpm_left"}
+    profile = Profile.from_dict({"time": {"from": "stamp"}, "channels": channels})
+    words = "ground_speed may be one component of a velocity: /vo.linear.y is 1.3 times /vo.linear.x."
+    assert profile.wants("/vo.linear.y")
+    assert any(words in note for note in profile.apply(log).notes)
+    log["/vo.linear.y"] *= 0.1  # a slide
+    assert not any("component" in note for note in profile.apply(log).notes)
+
+
+def test_units_behind_the_names_of_a_table_in_memory_count_as_in_a_file(foreign: pd.DataFrame) -> None:
+    """'the nearest column is ground_speed [km/h]: rename it' led to km/h taken for m/s."""
+    names = {"kmh": "ground_speed [km/h]", "rpm_left": "wheel_speed_fl (rpm)", "stamp": "time"}
+    log = foreign[list(names)].rename(columns=names)
+    for result in (
+        read(log),
+        read([log[["time", "ground_speed [km/h]"]], log[["time", "wheel_speed_fl (rpm)"]]]),
+    ):
+        np.testing.assert_allclose(result["ground_speed"], foreign["kmh"] / 3.6)
+        np.testing.assert_allclose(result["wheel_speed_fl"], foreign["rpm_left"] * np.pi / 30)
+    profile = Profile.from_dict(
+        {"channels": {"ground_speed": "ground_speed [km/h]", "wheel_speed_fl": {"constant": 1.0}}}
+    )
+    np.testing.assert_allclose(read(log, profile)["ground_speed"], foreign["kmh"])  # as the profile says
+
+
 def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None:
     profile = Profile.from_dict({"channels": {"ground_speed": {"from": "kmh", "unit": "km/h"}}})
     with pytest.raises(

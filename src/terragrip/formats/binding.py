@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ from terragrip.units import UnitError, factor_to
 
 if TYPE_CHECKING:
     from terragrip.formats.profile import Profile
+
+_SIDEWAYS = 0.3  # of the forward speed: more than wheels slip sideways
 
 
 def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Profile, list[str]]:
@@ -48,6 +51,7 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             lacking = next((c for c in every if not matching(c, log.columns)), every[0])
             several = len(origin.chain) > 1 or len(origin.candidates) > 1
             raise _missing(lacking, log, several_for=name if several else None)
+    notes += _of_other_axes(channels.get("ground_speed"), log)
     if absent and not partial:
         notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")
     time, rows = profile.time, profile.rows
@@ -66,6 +70,21 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             raise _missing(rows.column, log)
         rows = None
     return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
+
+
+def _of_other_axes(speed: Source | None, log: LogTable) -> list[str]:
+    """A sentence where the ground speed is one component of a velocity that has a large one beside it: then it is no forward speed."""
+    forward = "" if speed is None or not isinstance(speed.column, str) else speed.column
+    beside = re.sub(r"\.linear\.x$", ".linear.y", forward)
+    if beside == forward or not {forward, beside} <= log.columns.keys():
+        return []
+    along, across = (float(np.sqrt(np.nansum(np.square(log.columns[c])))) for c in (forward, beside))
+    if across <= _SIDEWAYS * along:
+        return []
+    return [
+        f"ground_speed may be one component of a velocity: {beside} is {across / max(along, 1e-9):.2g} times {forward}. Where they are "
+        f"east and north, or of a map, write 'ground_speed: {{norm_of: [{forward}, {beside}]}}' in a profile."
+    ]
 
 
 def _of_one_machine(profile: Profile, log: LogTable) -> tuple[LogTable, list[str]]:

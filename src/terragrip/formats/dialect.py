@@ -84,7 +84,7 @@ def detect(data: bytes, source: str) -> Dialect:
     units = dict(zip(header, map(_bare, second), strict=False)) if rows > 1 else {}
     if len(second) == len(header) + 1 and not second[-1]:
         header.append("")
-    names, notes = _names_and_units(header)
+    names, notes = names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
     units = {**notes, **units}
     in_cells = {
@@ -209,7 +209,7 @@ def _bare(cell: str) -> str:
     return "" if cell in ("-", "--", "none") else cell
 
 
-def _names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+def names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:
     """Column names without ``[unit]`` or ``(unit)`` behind them, where what stands there is a unit.
 
     A number or a letter is none where a column of the same name has another one that is no unit: ``speed[1]`` beside ``speed[0]``,

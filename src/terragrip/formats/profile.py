@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import fnmatch
 import os
+import re
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -118,8 +119,11 @@ class Profile(Part):
         return self
 
     def wants(self, name: str) -> bool:
-        """Whether the profile may read a column of this name."""
-        return name in self.sources or any(fnmatch.fnmatchcase(name, p) for p in self._patterns)
+        """Whether the profile may read a column of this name; of a velocity's x also y, which shows whether x is forward."""
+        return any(
+            one in self.sources or any(fnmatch.fnmatchcase(one, p) for p in self._patterns)
+            for one in (name, re.sub(r"\.linear\.y$", ".linear.x", name))
+        )
 
     @cached_property
     def _patterns(self) -> tuple[str, ...]:

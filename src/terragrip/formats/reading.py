@@ -12,6 +12,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
 from terragrip.formats.conversion import Part, converted
+from terragrip.formats.dialect import names_and_units
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
@@ -55,15 +56,14 @@ def read(
         from terragrip.formats.sources import merged
 
         paths: list[Any] = list(path) if hasattr(path, "__iter__") else [path]
-        for number, one in enumerate(paths, 1):
+        chosen_ones = _each(profile, paths)
+        for number, (one, own) in enumerate(zip(paths, chosen_ones, strict=True), 1):
             if _is_table(one):
-                columns = columns_of(one, f"table {number}")
-                paths[number - 1] = LogTable(tuple(columns), columns, source=f"table {number}")
+                paths[number - 1] = _in_memory(one, own, f"table {number}")
             elif not isinstance(one, str | os.PathLike):
                 raise InputError(
                     f"{type(one).__name__} is no log", hint="give a path, a DataFrame or a dict of arrays"
                 )
-        chosen_ones = _each(profile, paths)
         recording = merged([_part(p, own, databases) for p, own in zip(paths, chosen_ones, strict=True)])
         used = {id(own): own.to_dict() for own in chosen_ones if own is not None}
         return replace(recording, profiles=tuple(used.values()))
@@ -82,8 +82,15 @@ def _is_table(log: Any) -> bool:
 def _of_frame(frame: Any, profile: Any) -> Recording:
     if isinstance(profile, list | tuple):
         raise InputError("there are several profiles for one table", hint="give one profile")
-    columns = columns_of(frame, None)
-    return recording_of(LogTable(tuple(columns), columns), loaded(profile))
+    chosen = loaded(profile)
+    return recording_of(_in_memory(frame, chosen), chosen)
+
+
+def _in_memory(frame: Any, profile: Profile | None, source: str | None = None) -> LogTable:
+    """A table by its columns' names; without a profile, which may name them whole, units behind them are taken as such."""
+    columns = columns_of(frame, source)
+    names, units = (tuple(columns), {}) if profile is not None else names_and_units(list(columns))
+    return LogTable(names, dict(zip(names, columns.values(), strict=True)), units, source)
 
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:

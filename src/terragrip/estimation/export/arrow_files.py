@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,10 @@ class _ArrowFile:
         """Complete the file."""
         self._writer.close()
 
-    drop = close
+    def drop(self) -> None:
+        """Discard the file, which stays incomplete; Arrow's complaint of that would hide why."""
+        with suppress(OSError, ValueError):
+            self._writer.close()
 
 
 class ParquetFile(_ArrowFile):
