@@ -34,17 +34,18 @@ static void shift_loads(const tg_estimator *e, tg_real weight, tg_real inverse_m
 /* Of the vertical hitch load, wheel i's part. */
 static tg_real hitch_part(const tg_settings *s, int32_t i) { return s->hitch_share[s->wheel_axle[i]] * s->wheel_share[i]; }
 
-/* More mass: the loads grow with it, but for what the hitch does to them, and the forces move the vehicle less. */
+/* More mass, where the payload is: the loads grow with it, but for what the hitch does to them, and the forces move the vehicle less. */
 static void add_mass(const tg_estimator *e, const tg_input *u, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
-    const tg_real share = tgi_mass_spread(e);
+    const tg_real share = tgi_mass_spread(e), empty = s->machine.mass * s->machine.gravity;
     const tg_real pull = (tg_real)e->direction * u->drawbar * s->hitch_height; /* the moment that lifts the front */
     tg_real gain[TG_MAX_WHEELS], balance = -u->drawbar - mu[n] * u->hitch_load;
     for (int32_t i = 0; i < n; i++) {
         const tg_real hitch = hitch_part(s, i) * u->hitch_load - s->load_transfer[s->wheel_axle[i]] * s->wheel_share[i] * pull;
-        gain[i] = share * (u->load[i] - hitch);
+        const int32_t axle = s->wheel_axle[i];
+        gain[i] = share * (u->load[i] - hitch + (s->payload_share[axle] - s->load_share[axle]) * s->wheel_share[i] * empty);
         balance += mu[i] * u->load[i];
     }
     d->acceleration[k] = d->accelerometer[k] = (add_loads(e, mu, gain, d, k) - share * balance) * inverse_mass;

@@ -177,24 +177,6 @@ static int32_t wheels_are_silent(const tg_estimator *e, double time)
     return 1;
 }
 
-#define TG_PEAK ((tg_real)2.4674) /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
-
-/* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. And the square of
- * a torque's leap that its next sample has not confirmed, times how likely it is real: the more, the more of the time over which increments
- * are known lies between two samples, and the less it exceeds what two adhesions differ by. */
-static void doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive)
-{
-    const tg_settings *s = &e->settings;
-    for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const tg_hold *const torque = &e->torque[i];
-        const tg_real square = row->chatter[i], arm = s->machine.radius[i] * drive->load[i];
-        e->scene.doubt[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (arm * e->wheel[i].interval)) : 0;
-        if (!(torque->spike > 0)) continue;
-        const tg_real leap = torque->spike / tgi_square(arm), real = tgi_exp(-leap / (4 * tgi_square(s->prior_adhesion_std)));
-        e->scene.doubt[i] += leap * real * torque->interval / (s->tuned.increment_memory + torque->interval);
-    }
-}
-
 static void report(tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_estimate *out)
 {
     const int32_t n = e->settings.machine.wheels;
@@ -206,7 +188,6 @@ static void report(tg_estimator *e, const tg_row *row, const tg_drive *drive, tg
     }
     for (int32_t i = 0; i < n; i += TG_LANES)
         lanes_store(e->scene.turn + i, tgi_turn_variance(&e->settings, i, lanes_load(e->belief.x + n + 2 + i), e->belief.x[n + 1], (tg_real)e->direction * e->unseen_turn));
-    doubt_adhesions(e, row, drive);
     e->scene.direction = (tg_real)e->direction;
     e->scene.standing = (tg_real)(e->standing || wheels_are_silent(e, out->time));
     e->scene.seen_motion = (tg_real)e->seen_motion;
@@ -216,6 +197,7 @@ static void report(tg_estimator *e, const tg_row *row, const tg_drive *drive, tg
     e->scene.unseen_load = tgi_unseen_load(e);
     if (e->constants.warps) e->scene.unseen_load += tgi_lasting_warp(e, e->scene.warp);
     e->scene.unseen_grade = tgi_unseen_grade(e);
+    tgi_doubt_adhesions(e, row, drive);
     e->scene.slow_speed = tgi_slow_variance(e);
     e->scene.disputed = tgi_disputed_variance(e, drive);
     e->scene.late = tgi_late_variance(e, drive);
@@ -306,6 +288,7 @@ tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estim
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
     tgi_doubt_speeds(e, &row, dt);
+    tgi_watch_shares(e, sample);
     int32_t turned = tgi_track_motion(e, &row);
     if (turned) mirror(&e->held, n);
     tgi_track_turn(e, &row);

@@ -52,7 +52,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
-    tg_real doubt[8]; /* wheel: variance of an adhesion that alternates from sample to sample, or whose torque may have leapt, see inputs.c */
+    tg_real doubt[8]; /* wheel: variance of an adhesion that alternates from sample to sample, or whose torque may have leapt or be no share of its own, see doubt.c */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real turn[8]; /* wheel: variance of its slip by a turn that no sensor shows */
     tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */
@@ -115,7 +115,8 @@ typedef struct { /* uneven ground, see roughness.c */
     tg_real own;                     /* mean variance of an adhesion, by the filter */
     tg_real wander, bumps;           /* mean squares of rho_s about both: what soil and bumps do within metres, and bumps alone */
     tg_real own_resistance;          /* mean variance of rho_s, by the filter */
-    tg_real usual, swing, way;       /* rho_s over the distance: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
+    tg_real grade;                   /* mean square of the slope, over the distance, */
+    tg_real usual, swing, way;       /* and rho_s: its mean, its mean square about that, wheel radii that these cover; 0: nothing yet */
     tg_real waited;                  /* wheel radii since a row held a wheel's speed */
 } tgi_roughness;
 
@@ -248,6 +249,7 @@ struct tg_estimator {
     tg_hold wheel[8], ground;  /* speeds */
     tg_hold forward;           /* acceleration */
     int32_t sparse_wheels;
+    int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c */
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
@@ -287,6 +289,10 @@ TG_INLINE tg_real tgi_walk(const tg_hold *h, tg_real noise) { return h->interval
 /* estimator.c */
 void tgi_end_row(tg_estimator *e, const tg_row *row, tg_estimate *out);
 int32_t tgi_event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost);
+
+/* doubt.c */
+void tgi_watch_shares(tg_estimator *e, const tg_sample *sample);
+void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive);
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);

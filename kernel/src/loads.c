@@ -69,6 +69,15 @@ static tg_real specific_force(tg_estimator *e, const tg_row *row)
     return e->balance.seen ? e->balance.value : 0;
 }
 
+/* Specific force to the left, which moves load from the left wheels to the right: the accelerometer's, else what the turn and a measured
+ * roll make of it, v psi' + g sin(roll). */
+static tg_real lateral_force(tg_estimator *e, const tg_row *row, tg_real g)
+{
+    const tg_real roll = row->value[TG_ROLL], felt = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, e->settings.load_filter);
+    if (e->lateral.seen) return felt;
+    return (tg_real)e->direction * e->belief.x[e->settings.machine.wheels + 1] * e->yaw_rate + (isnan(roll) ? 0 : g * tgi_sin(roll));
+}
+
 /* A load measured on an axle is used; axles without one share the rest of the weight by their static shares. */
 static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_real *load)
 {
@@ -133,9 +142,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     }
     use_measured(e, row, weight, load);
 
-    tg_real lateral = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, s->load_filter);
-    if (!e->lateral.seen && !isnan(row->value[TG_ROLL])) lateral = g * tgi_sin(row->value[TG_ROLL]);
-    lateral *= lean;
+    const tg_real lateral = lean * lateral_force(e, row, g);
     for (int32_t k = 0; k < s->axles; k++) drive->axle_load[k] = load[k];
     for (int32_t i = 0; i < m->wheels; i++) {
         tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);

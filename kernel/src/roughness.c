@@ -29,7 +29,7 @@ static void count_square(tg_real *mean, tg_real square, tg_real least, tg_real m
     *mean += gain * ((square < most ? square : most) - *mean);
 }
 
-/* rho_s over the whole way; at first the prior, as if driven over the length of `uneven_memory`. */
+/* rho_s and the slope over the whole way; rho_s is at first the prior, as if driven over the length of `uneven_memory`. */
 static void watch_hills(tg_estimator *e, tg_real rho, tg_real travelled)
 {
     tgi_roughness *r = &e->roughness;
@@ -41,6 +41,7 @@ static void watch_hills(tg_estimator *e, tg_real rho, tg_real travelled)
     r->way = r->way + travelled < k->hill_memory ? r->way + travelled : k->hill_memory;
     const tg_real gain = travelled / r->way;
     r->usual += gain * (rho - r->usual);
+    if (travelled > 0) r->grade += travelled / (r->way - k->uneven_memory) * (tgi_square(e->held.slope) - r->grade);
     r->swing += gain * (tgi_square(rho - r->usual) - r->swing);
 }
 

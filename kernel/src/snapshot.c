@@ -3,7 +3,7 @@
  * against its range. */
 #include "fields.h"
 
-#define TG_SNAPSHOT_VERSION 24u
+#define TG_SNAPSHOT_VERSION 25u
 
 typedef struct {
     char magic[8];

@@ -244,13 +244,11 @@ class Sensors(Part):
     hitch_load: _ForceSD | None = None
 
 
-PITCH_ZERO = math.radians(0.2)
-"""SD [rad] of a pitch sensor's zero, its mounting included: the vehicle file has no key for it."""
-
 _UNSTATED = {
     "drive_torque_gain": 0.1,  # of motor currents and of strain gauges on a shaft
     "drawbar_gain": 0.01,
     "slope": math.radians(0.5),
+    "pitch_offset": math.radians(0.2),  # mounting included
     "wheel_radius": 0.02,  # docs/vehicle.md
     "vertical_load": 0.01,  # of the mean axle load, of an axle that was weighed
     "acceleration_bias": 0.3,  # mounting included
@@ -266,7 +264,8 @@ class Uncertainty(Part):
     drawbar_gain: _Ratio | None = None
     drawbar_offset: _Force | None = None
     drawbar_force: _Force | None = None  # of a pull that no cell measures
-    slope: _Angle | None = None
+    slope: _Angle | None = None  # that no pitch sensor measures
+    pitch_offset: _Angle | None = None  # of a pitch sensor's zero
     wheel_radius: _Ratio | None = None
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.15)] | None = (
         None  # of the load, as its key
@@ -284,6 +283,14 @@ class Uncertainty(Part):
         """
         stated: float | None = getattr(self, key)
         return _UNSTATED[key] if stated is None else stated
+
+    def of_slope(self, channels: Collection[str]) -> float:
+        """SD [rad] of a lasting error of the slope: where ``channels`` have a pitch, of its sensor's zero alone, else of the slope."""
+        given = self.slope or 0.0
+        if "pitch" not in channels:
+            return given
+        usual = self.assumed("pitch_offset")
+        return min(given, usual) if self.pitch_offset is None else usual
 
     def of_pull(self, channels: Collection[str]) -> float:
         """SD [N] of a lasting error of the pull: of the cell's zero where ``channels`` have a drawbar force, else of the pull itself."""

@@ -128,3 +128,40 @@ def test_a_wheel_never_floats():
     estimates = estimate(steady(drawbar_force=2000.0), robot(), held={})
     assert estimates["vertical_load_front"][-1] < 100
     assert np.isfinite(estimates["adhesion_fl"]).all()
+
+
+def test_a_turn_stands_in_for_a_missing_accelerometer():
+    """v psi' to the inner side, and with it what a roll adds."""
+    turning = {"angular_velocity_z": 0.3, "roll": 0.1}
+    by_turn = estimate(steady(**turning), robot(), held={})
+    sideways = by_turn["ground_speed"][-1] * 0.3 + GRAVITY * np.sin(0.1)
+    by_force = estimate(steady(acceleration_y=sideways, angular_velocity_z=0.3), robot(), held={})
+    assert by_turn["adhesion_rl"][-1] == pytest.approx(by_force["adhesion_rl"][-1], rel=1e-4)
+
+
+def test_on_hills_without_a_roll_the_side_slope_may_be_as_steep():
+    """The share of its gross traction that a wheel's load of one SD more or less makes; on level ground, and with a roll, none."""
+    slope = 0.1
+    hilly = {"pitch": slope, "acceleration_x": GRAVITY * np.sin(slope)}
+    blind, seeing = (estimate(steady(**hilly, **more), robot(), held={}) for more in ({}, {"roll": 0.0}))
+    level = [estimate(steady(pitch=0.0, **more), robot(), held={}) for more in ({}, {"roll": 0.0})]
+    left, _ = lateral_shares(2, GRAVITY * slope, center_of_gravity_height=0.30, track=0.554)
+    added = np.sqrt(blind["adhesion_rl_std"][-1] ** 2 - seeing["adhesion_rl_std"][-1] ** 2)
+    assert added == pytest.approx((seeing["adhesion_rl"][-1] + 0.02) * abs(1 - 2 * left), rel=0.05)
+    assert blind["soil_resistance_std"][-1] == pytest.approx(seeing["soil_resistance_std"][-1], rel=1e-6)
+    np.testing.assert_allclose(level[0]["adhesion_rl_std"], level[1]["adhesion_rl_std"], rtol=1e-9)
+
+
+def test_a_torque_that_two_wheels_share_is_theirs_but_for_the_differential():
+    """Each wheel's adhesion is less sure, and what both do together is not."""
+    noise = np.random.default_rng(3).normal(0, 0.2, (1200, 2))
+    log = steady()
+
+    def seen(right: int) -> Estimates:
+        torque = {f"drive_torque_r{side}": 15.0 + noise[:, k] for side, k in (("l", 0), ("r", right))}
+        return estimate(log.with_channels(**torque), robot(), held={})
+
+    shared, own = seen(0), seen(1)
+    added = np.sqrt(shared["adhesion_rl_std"][-1] ** 2 - own["adhesion_rl_std"][-1] ** 2)
+    assert added == pytest.approx(0.05 * (own["adhesion_rl"][-1] + 0.02), rel=0.2)
+    assert shared["soil_resistance_std"][-1] == pytest.approx(own["soil_resistance_std"][-1], rel=0.05)

@@ -91,15 +91,18 @@ def test_a_tank_that_fills():
     assert np.mean(off_plain) > 0.1
 
 
-@pytest.mark.parametrize("method", ["kalman", "algebraic"])
-def test_the_spread_of_the_mass_is_what_an_error_of_it_does(method):
-    """Against a difference: the log's mass wrong by one SD moves the estimate by the column that one SD of it makes."""
+@pytest.mark.parametrize(
+    ("method", "places"), [("kalman", {}), ("algebraic", {}), ("kalman", {"payload": {"x": -0.3}})]
+)
+def test_the_spread_of_the_mass_is_what_an_error_of_it_does(method, places):
+    """Against a difference: the log's mass wrong by one SD moves the estimate by the column that one SD of it makes, a payload's behind
+    the rear axle, too."""
     log = with_values(
         drive(12.0, noise=0.2, imu=True, slip=lambda t: 0.12 + 0 * t).recording, "pitch", slice(None), 0.0
     )
     log = log.with_channels(mass=np.full(len(log), MASS + 30.0))
     share, size = 0.1, 1e-4
-    quiet = robot(uncertainty={}, sensors=tanker().to_dict()["sensors"] | {"mass": 1e-3})
+    quiet = robot(uncertainty={}, sensors=tanker().to_dict()["sensors"] | {"mass": 1e-3}, **places)
     plain = estimate(log, quiet, method)
     doubtful = estimate(
         log,

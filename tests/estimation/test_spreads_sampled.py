@@ -12,10 +12,12 @@ from drives import GRAVITY, MASS, RADIUS, TIRE, WHEELS, drive, robot
 from terragrip import _kernel
 from terragrip.estimation import TractionEstimator
 from terragrip.estimation.forward import prepared
+from terragrip.physics.loads import lateral_shares
 from terragrip.physics.slip import slip as slip_of
 
 DRAWS = 100_000
 WHEEL_RADIUS = 0.02
+SLOPE = 0.01
 COLUMNS = 7  # torque gain of each wheel, drawbar, slope, the tyres' rolling resistance
 
 
@@ -37,7 +39,7 @@ def test_spreads_agree_with_sampling(slip):
     made = drive(12.0, noise=0.02, slip=lambda t: slip + 0.0 * t, seed=5)  # quiet: no rough ground to add
     vehicle = robot(
         uncertainty={
-            "drive_torque_gain": 0.02, "drawbar_offset": 6.0, "slope": 0.01, "tire_rolling_resistance": 0.003,
+            "drive_torque_gain": 0.02, "drawbar_offset": 6.0, "slope": SLOPE, "tire_rolling_resistance": 0.003,
             "wheel_radius": WHEEL_RADIUS,
         }
     )  # fmt: skip
@@ -64,6 +66,9 @@ def test_spreads_agree_with_sampling(slip):
     rho = rho - error * (x[5:9] @ loads) / (MASS * GRAVITY)
     assert unseen >= _kernel.lib.tg_default_settings().tuned.least_load_spread
     mu = mu * (1 - error) + x[5:9] * unseen * rng.standard_normal((DRAWS, 4))
+    left, _ = lateral_shares(2, GRAVITY * SLOPE, center_of_gravity_height=0.30, track=0.554)
+    # no roll: the ground may be as steep to the side
+    mu += (x[5:9] + TIRE) * (1 - 2 * left) * rng.standard_normal((DRAWS, 4))
     result = slip_of(drawn[:, :4], drawn[:, 4:5], RADIUS * (1 + error))
     net = mu - rho
     efficiency = np.where(net > 0, net / (mu + TIRE) * (1 - result), 0.0)

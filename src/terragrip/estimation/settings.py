@@ -18,7 +18,7 @@ from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.recording.checks import require_hitch
 from terragrip.vehicle import Vehicle
-from terragrip.vehicle_parts import PITCH_ZERO, BidermanRadius, HadekelRadius, Wheel
+from terragrip.vehicle_parts import BidermanRadius, HadekelRadius, Wheel
 
 
 @dataclass(frozen=True)
@@ -210,5 +210,4 @@ def _set_uncertainty(settings: Any, vehicle: Vehicle, channels: Collection[str])
     for name, _ in ffi.typeof("tg_uncertainty").fields:
         setattr(spread, name, getattr(given, name) or 0.0)
     spread.drawbar_offset = given.of_pull(channels)
-    if "pitch" in channels and given.slope is not None:
-        spread.slope = min(given.slope, PITCH_ZERO)
+    spread.slope = given.of_slope(channels)

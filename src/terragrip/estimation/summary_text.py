@@ -192,7 +192,7 @@ def _assumed(tally: Tally) -> list[str]:
 
 def _short(name: str, value: float) -> str:
     """A considered spread with its unit."""
-    if name == "slope":
+    if name in ("slope", "pitch_offset"):
         return f"{np.rad2deg(value):.2g} deg"
     unit = {
         "drive_torque_offset": " N m",

@@ -31,8 +31,8 @@ _MISSING = np.int64(0x7FF8 << 48)
 def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Sentences on torques of several wheels that are one signal, and on speeds of both sides of an axle that are."""
     notes = [
-        f"{', '.join(group)} are one signal: how wheels share it was not measured, so only their mean adhesion is, and single wheels' "
-        "intervals are too narrow. If it is the sum of their torques, divide it ('scale:' in the profile)."
+        f"{', '.join(group)} are one signal: how wheels share it was not measured, so only their mean adhesion is. Single wheels' "
+        "intervals hold an open differential's friction, no lock. If it is the sum of their torques, divide it ('scale:' in the profile)."
         for group in _groups(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
     for axle in vehicle.axles.values():

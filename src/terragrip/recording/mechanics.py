@@ -324,8 +324,8 @@ def _offset_warnings(means: Means, forward: Floats, vehicle: Vehicle | None) -> 
         return []
     beside = "" if stated is None else f", where the vehicle file's acceleration_bias is {stated:.2g}"
     return [
-        f"acceleration_x reads {offset:.2g} m/s² more than speed and pitch explain{beside}: its bias or its mounting, which "
-        "'terragrip calibrate' finds."
+        f"acceleration_x reads {offset:.2g} m/s² more than speed and pitch explain{beside}: its bias or its mounting, or the "
+        "pitch sensor's, which 'terragrip calibrate' finds."
     ]
 
 

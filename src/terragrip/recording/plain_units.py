@@ -45,6 +45,7 @@ _BOUNDS = (
     ("sensors.acceleration", "m/s^2", "", (1e-5, 5.0), ("mm/s^2",)),
     ("sensors.pitch", "rad", "", (1e-6, 0.15), ("deg",)),
     ("uncertainty.slope", "rad", "", (0.0, 0.2), ("deg",)),
+    ("uncertainty.pitch_offset", "rad", "", (0.0, 0.2), ("deg",)),
     ("uncertainty.acceleration_bias", "m/s^2", "", (0.0, 2.0), ("mm/s^2",)),
     ("uncertainty.wheel_radius", "1", "", (0.0, 0.3), ("%",)),
     ("uncertainty.drive_torque_gain", "1", "", (0.0, 0.7), ("%",)),

@@ -30,7 +30,6 @@ from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
 from terragrip.vehicle import Vehicle
-from terragrip.vehicle_parts import PITCH_ZERO
 
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
 _SENSOR_BIAS = 0.03  # m/s^2 where the vehicle gives none, of an accelerometer that is level to .2 deg
@@ -245,7 +244,7 @@ def _channel_errors(
     sensor = _SENSOR_BIAS if stated.acceleration_bias is None else stated.acceleration_bias
     measured = all("acceleration_x" in log.channels for log in logs)
     pitched = all("pitch" in log.channels for log in logs)
-    kinematic = GRAVITY * PITCH_ZERO if pitched else ground
+    kinematic = GRAVITY * stated.assumed("pitch_offset") if pitched else ground
     push = errors.get("acceleration_bias_x", sensor) if measured else kinematic
     lateral = sensor if all("acceleration_y" in log.channels for log in logs) else ground
     return ChannelErrors(
@@ -334,6 +333,7 @@ def _left(quantities: Sequence[Quantity], vehicle: Vehicle) -> dict[str, Any]:
         ("drive_torque_offset", "drive_torque_offset"),
         ("drawbar_offset", "drawbar_offset"),
         ("acceleration_bias_x", "acceleration_bias"),
+        ("pitch_offset", "pitch_offset"),
     ):
         error = spread(key)
         if error is not None:

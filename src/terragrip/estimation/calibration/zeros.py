@@ -16,7 +16,7 @@ from terragrip.estimation.calibration.result import Evidence, Quantity, Unknown
 from terragrip.estimation.calibration.windows import Windows
 from terragrip.physics.loads import GRAVITY
 from terragrip.vehicle import Vehicle
-from terragrip.vehicle_parts import PITCH_ZERO, Uncertainty
+from terragrip.vehicle_parts import Uncertainty
 
 WINDOW = 0.5
 """Window length [s] in which standstill is searched for."""
@@ -187,7 +187,8 @@ def torque_zeros(
             why = "at standstill on a slope the torques are those that hold the vehicle: stand with the motors off"
             return [], [Unknown(key, why)]
         if not any(spell in released for spell in calm):
-            level = PITCH_ZERO * vehicle.mass * GRAVITY * float(vehicle.wheel_radius.mean()) / len(driven)
+            level = vehicle.uncertainty.assumed("pitch_offset") * vehicle.mass * GRAVITY
+            level *= float(vehicle.wheel_radius.mean()) / len(driven)
     if not calm:
         least = min(
             (stop_means(torque, spell) for spell in stops), key=lambda mean: np.max(np.abs(mean) - allowed)
@@ -216,7 +217,7 @@ def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: slice
     """How much of the weight along a measured slope the driven wheels' ``torque`` (n, k) carries at a stop; NaN where it is level to three
     standard deviations of a pitch sensor's zero, or no pitch is known."""
     pitch = float(stop_means(windows.pitch[:, None], spell)[0])
-    if not abs(pitch) > 3 * PITCH_ZERO:
+    if not abs(pitch) > 3 * vehicle.uncertainty.assumed("pitch_offset"):
         return float("nan")
     thrust = np.sum(stop_means(torque, spell) / vehicle.wheel_radius[vehicle.driven])
     return float(thrust / (vehicle.mass * GRAVITY * np.sin(pitch)))
@@ -304,7 +305,7 @@ def inclination_zeros(
     rests_on = evidence(windows, rows_of(stops), sources, windows.acceleration_count)
     # The ground differs from spell to spell, a sensor's zero does not.
     ground = stated.assumed("slope") / np.sqrt(len(stops))
-    other = GRAVITY * (PITCH_ZERO if pitched else ground)
+    other = GRAVITY * (stated.assumed("pitch_offset") if pitched else ground)
     own = stated.assumed("acceleration_bias")
     if abs(total) > 3 * np.hypot(own, other):
         own = max(own, Uncertainty().assumed("acceleration_bias"))
