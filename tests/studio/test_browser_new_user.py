@@ -213,7 +213,13 @@ def test_a_scale_that_only_the_user_knows_is_asked_for_and_the_choice_is_that_of
     assert page.evaluate("() => document.activeElement.ariaLabel") == "Scale of drive_torque_fl"
     for wheel in WHEELS:
         page.fill(f"[aria-label='Scale of drive_torque_{wheel}']", "2,5")
+    unit = page.input_value("[aria-label='Unit of ground_speed']")
+    page.fill("[aria-label='Unit of ground_speed']", "deg")
     page.click("#use-columns")
+    page.wait_for_selector(".note.error")
+    page.fill("[aria-label='Unit of ground_speed']", unit)
+    page.click("#use-columns")
+    page.wait_for_selector(".note.error", state="detached")  # what was repaired went on to be said
     page.wait_for_selector("#wizard-profile option[value='day2-profile.yaml']", state="attached")
     (kept,) = folder.glob("*-profile.yaml")
     profile = yaml.safe_load(kept.read_text())

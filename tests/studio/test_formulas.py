@@ -82,6 +82,7 @@ def test_the_columns_of_a_formula_are_named() -> None:
         ("max(a, key=b)", "equals sign"),
         ("a[0]", "Subscript is not arithmetic"),
         ("a * 9,81", "write a number as 9.81"),
+        ("max(a, 0,5)", "write a number as 9.81"),  # it was the largest of a, 0 and 5
         ("[a for a in b]", "is not arithmetic"),
         ("a if b else 1", "is not arithmetic"),
         ("a and b", "is not arithmetic"),

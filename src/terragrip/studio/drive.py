@@ -145,8 +145,8 @@ def _of_slip(table: Estimates, wheel: str, before: slice, after: slice) -> str:
     if not np.isfinite(moved).all():
         return f"{wheel}: slip is undefined before or after."
     return (
-        f"{wheel}: slip {100 * moved[0]:+.1f} points within {2 * SPAN:g} s; wheel speed {moved[1]:+.2f} rad/s, ground speed "
-        f"{moved[2]:+.2f} m/s. Without a torque there is no adhesion."
+        f"{wheel}: slip {100 * moved[0]:+z.1f} points within {2 * SPAN:g} s; wheel speed {moved[1]:+z.2f} rad/s, ground speed "
+        f"{moved[2]:+z.2f} m/s. Without a torque there is no adhesion."
     )
 
 
@@ -183,16 +183,16 @@ def _sentence(
     channel = f"drive_torque_{wheel}"
     if recording is not None and channel in recording.channels:
         torque = [_mean(recording.channels[channel], rows) for rows in (before, after)]
-        parts.append((f"torque {torque[1] - torque[0]:+.1f} N m", (torque[1] - torque[0]) / arm))
-        parts.append((f"load {load[1] - load[0]:+.0f} N", torque[0] / radius * (1 / load[1] - 1 / load[0])))
+        parts.append((f"torque {torque[1] - torque[0]:+z.1f} N m", (torque[1] - torque[0]) / arm))
+        parts.append((f"load {load[1] - load[0]:+z.0f} N", torque[0] / radius * (1 / load[1] - 1 / load[0])))
     else:
-        parts.append((f"load {load[1] - load[0]:+.0f} N", float("nan")))
+        parts.append((f"load {load[1] - load[0]:+z.0f} N", float("nan")))
     parts.append(
-        (f"wheel acceleration {rate[1] - rate[0]:+.1f} rad/s²", -inertia * (rate[1] - rate[0]) / arm)
+        (f"wheel acceleration {rate[1] - rate[0]:+z.1f} rad/s²", -inertia * (rate[1] - rate[0]) / arm)
     )
     wheels = ", ".join(
-        f"{text} ({effect:+.3f})" if np.isfinite(effect) else text
+        f"{text} ({effect:+z.3f})" if np.isfinite(effect) else text
         for text, effect in sorted(parts, key=lambda part: -abs(part[1]) if np.isfinite(part[1]) else 0.0)
     )
     slip = _mean(table[f"slip_{wheel}"], after) - _mean(table[f"slip_{wheel}"], before)
-    return f"{wheel}: adhesion {moved:+.3f} within {2 * SPAN:g} s; {wheels}; slip {100 * slip:+.1f} points."
+    return f"{wheel}: adhesion {moved:+z.3f} within {2 * SPAN:g} s; {wheels}; slip {100 * slip:+z.1f} points."

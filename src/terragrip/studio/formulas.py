@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 import sys
 import warnings
 from collections.abc import Callable
@@ -62,6 +63,12 @@ def parsed(text: str) -> ast.expr:
         raise InputError("is empty", place="formula", hint="for example slip_rl - slip_rr")
     if len(text) > LONGEST:
         raise InputError(f"is longer than {LONGEST} characters", place="formula")
+    if re.search(r"\d,\d", text):
+        raise InputError(
+            "a comma between two digits",
+            place="formula",
+            hint="write a number as 9.81, and a blank after the comma that separates two",
+        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)  # such as of `1(2)`, which is refused below
@@ -104,13 +111,11 @@ def _allow(node: ast.AST) -> None:
         node, (ast.BinOp, ast.UnaryOp, ast.Compare, ast.Name, ast.Load, *BINARY, *UNARY, *COMPARISONS)
     ):
         kind = type(node).__name__
-        if kind == "Tuple":
-            raise InputError(
-                "a comma separates the arguments of a function",
-                place="formula",
-                hint="write a number as 9.81",
-            )
-        dotted = "a dot is not part of a name" if kind == "Attribute" else f"{kind} is not arithmetic"
+        words = {
+            "Tuple": "a comma separates the arguments of a function",
+            "Attribute": "a dot is not part of a name",
+        }
+        dotted = words.get(kind, f"{kind} is not arithmetic")
         raise InputError(dotted, place="formula", hint=ALLOWED)
 
 

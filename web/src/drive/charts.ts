@@ -231,7 +231,7 @@ export class Charts {
       const about = panel.about ? h("span", { class: "hint about", title: panel.about }, panel.about) : null;
       const setShown = (range: Range | null): void => this.setUpright(panel.key, range && [range[0] / panel.scale, range[1] / panel.scale]);
       const upright = (text: string, title: string, change: () => Range | null): HTMLElement =>
-        h("button", { type: "button", class: "quiet", title, "aria-label": `${title}: ${panel.title}`, click: () => setShown(change()) }, text);
+        h("button", { type: "button", class: "quiet", title, "aria-label": `${text}: ${title} of ${panel.title}`, click: () => setShown(change()) }, text);
       const now = (): Range => this.scale(i) ?? [0, 1];
       const middle = (): number => (now()[0] + now()[1]) / 2;
       const buttons = panel.log
@@ -241,7 +241,7 @@ export class Charts {
             { class: "upright" },
             upright("y+", "Stretch the vertical axis", () => zoomed(now(), middle(), 0.6)),
             upright("y−", "Shrink the vertical axis", () => zoomed(now(), middle(), 1 / 0.6)),
-            upright("auto", "Fit the vertical axis to its values", () => null),
+            upright("auto", "Fit the vertical axis", () => null),
           );
       const box = h("div", { class: "chart", role: "group", "aria-label": `${panel.title} over ${AXES[this.axis].title}` }, h("div", { class: "chart-head" }, h("h2", {}, `${panel.title} [${panel.unit}]`), readout.element, about, buttons));
       box.classList.toggle("fixed", panel.key in this.uprights);

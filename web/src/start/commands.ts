@@ -92,15 +92,17 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
   allowed();
   form.addEventListener("submit", (event) => {
     event.preventDefault();
+    if (go.disabled) return; // a second click would ask for the same file again
     void tried(async () => {
       const path = output.value.trim();
       const replace = items.some((item) => item.path === path || item.path.startsWith(`${path}/`));
       if (replace && !confirm(`Replace ${path}?`)) return;
       const wanted: Record<string, unknown> = { [command.files]: files, output: path, replace };
       for (const [key, field] of fields) wanted[key] = field instanceof HTMLInputElement && field.type === "checkbox" ? field.checked : field.value.trim() ? (SENT[key] ?? String)(field.value) : null;
-      queued(await send<Job>("POST", `jobs/${command.kind}`, wanted));
+      go.disabled = true;
+      queued(await send<Job>("POST", `jobs/${command.kind}`, wanted).finally(allowed));
       dialog.close();
-    });
+    }, "job");
   });
   fill(dialog, form);
   dialog.showModal();

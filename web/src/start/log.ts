@@ -45,6 +45,7 @@ export class LogPage {
   private key = ""; // the log, in its folder
   private left = ""; // as it was left: what the log is read by and estimated with, in words
   private looks = 0;
+  private queueing = false;
   private hasLabels = false;
   private estimates = "";
   private hasAdhesion = true; // of the estimates
@@ -306,8 +307,10 @@ export class LogPage {
 
   private async queue(kind: string, wanted: Record<string, unknown>, output: string): Promise<void> {
     const replace = this.items.some((item) => item.path === output);
-    if (replace && !confirm(`Replace ${output}?`)) return;
-    const job = await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }));
+    if (this.queueing || (replace && !confirm(`Replace ${output}?`))) return;
+    this.queueing = true; // a second click would ask for the same file again
+    const job = await tried(() => send<Job>("POST", `jobs/${kind}`, { ...wanted, output, replace }), "job");
+    this.queueing = false;
     if (!job) return;
     this.jobs.update(job);
     if (kind === "estimate") this.proposeOutput();

@@ -187,7 +187,7 @@ export class MachineMaker {
 
   private async keep(): Promise<void> {
     const output = this.output.value.trim();
-    const kept = await tried(() => send<{ path: string; command: string }>("POST", "machines/file", { ...this.wanted, output }));
+    const kept = await tried(() => send<{ path: string; command: string }>("POST", "machines/file", { ...this.wanted, output }), "machine");
     if (!kept) return;
     this.saved(kept.path);
     this.element.dispatchEvent(new CustomEvent("kept", { detail: commandLine(kept.command) }));

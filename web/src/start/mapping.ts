@@ -289,7 +289,7 @@ export class Mapping {
     const named = new Map(this.look?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
     const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [named.get(name) ?? name, choice.entry]));
     const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, replace: isOld || output === this.own };
-    const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted));
+    const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted), "columns");
     if (!kept) return;
     this.own = kept.path;
     this.saved(kept.path);

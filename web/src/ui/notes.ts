@@ -2,12 +2,13 @@ import { h } from "./dom";
 
 export const SHOWN = 6000; // ms
 
-/** One line at the foot of the page; an error stays until it is dismissed, or its page is left. The same line is not shown twice. */
-export function note(text: string, kind: "info" | "error" = "info"): void {
+/** One line at the foot of the page; an error stays until it is dismissed, or its page is left. The same line is not shown twice.
+ * `about`: of what it is, for `tried`. */
+export function note(text: string, kind: "info" | "error" = "info", about = ""): void {
   const box = document.getElementById("notes");
   if (!box) return;
   withdraw(text);
-  const line = h("div", { class: `note ${kind}`, role: kind === "error" ? "alert" : null }, h("span", {}, text));
+  const line = h("div", { class: `note ${kind}`, role: kind === "error" ? "alert" : null, "data-about": about }, h("span", {}, text));
   line.append(h("button", { type: "button", "aria-label": "Dismiss", click: () => line.remove() }, "×"));
   box.append(line);
   while (box.children.length > 4) box.firstElementChild?.remove();
@@ -23,12 +24,15 @@ export function withdraw(text?: string, after = 0): void {
   }
 }
 
-/** Run something and show its failure as a note; undefined where it failed. */
-export async function tried<T>(work: () => Promise<T>): Promise<T | undefined> {
+/** Run something and show its failure as a note; undefined where it failed. With `about`, the failure of the same work before is no
+ * longer shown once it succeeds. */
+export async function tried<T>(work: () => Promise<T>, about = ""): Promise<T | undefined> {
   try {
-    return await work();
+    const done = await work();
+    if (about) for (const line of document.querySelectorAll(`#notes > [data-about="${CSS.escape(about)}"]`)) line.remove();
+    return done;
   } catch (error) {
-    note(error instanceof Error ? error.message : String(error), "error");
+    note(error instanceof Error ? error.message : String(error), "error", about);
     return undefined;
   }
 }
