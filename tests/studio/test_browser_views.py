@@ -155,7 +155,7 @@ def test_an_upright_axis_is_zoomed_and_follows_again(page: Any, served: Served) 
     )
     assert page.evaluate(scale, 1) == second  # the others stay
     page.hover(".chart >> nth=0")
-    page.click("button[aria-label^='Fit the vertical axis to its values: Slip']")
+    page.click("button[aria-label='auto: Fit the vertical axis of Slip s']")
     page.wait_for_function(f"s => ({scale})(0).join() === s.join()", arg=first)
 
 
