@@ -37,14 +37,17 @@ def shared() -> Callable[[str], Path]:
     return locate
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+def _undrawn() -> Generator[None]:
     """Figures are made but not drawn: for tests that read a report's words, of whose time drawing is three quarters."""
-    monkeypatch.setattr("matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda *_: None)
-    monkeypatch.setattr(
-        "matplotlib.figure.Figure.savefig",
-        lambda _, sink, **__: sink.write('<svg width="100pt" height="50pt"></svg>'),
-    )
+    empty = '<svg xmlns="http://www.w3.org/2000/svg" width="100pt" height="50pt"></svg>'
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.layout_engine.ConstrainedLayoutEngine.execute", lambda *_: None)
+        patch.setattr("matplotlib.figure.Figure.savefig", lambda _, sink, **__: sink.write(empty))
+        yield
+
+
+undrawn = pytest.fixture(_undrawn, name="undrawn")
+undrawn_in_file = pytest.fixture(_undrawn, name="undrawn_in_file", scope="module")
 
 
 @pytest.fixture(scope="module")

@@ -32,6 +32,9 @@ from small_fleet import (
 )
 from terragrip.cli import main
 
+LONG = 500.0
+"""Seconds of a log whose estimate takes some of the worker's time: a busy worker is looked for every 50 ms."""
+
 
 def until(condition: Callable[[], object]) -> None:
     """Wait for something that another process does."""
@@ -84,7 +87,7 @@ def scratch(place: Path) -> Iterator[None]:
 @pytest.mark.long  # test_a_worker_here_that_dask_gives_up_is_started_anew kills one too, and its nanny does not help
 @pytest.mark.usefixtures("scratch")
 def test_a_worker_that_is_killed_in_mid_task(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     fault = Fault(place)
     code = main(call(place))
     assert not fault.is_alive(), "no task was seen at work"
@@ -115,7 +118,7 @@ def test_a_log_that_needs_more_memory_than_a_worker_has(
 
 
 def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     process = start(place, "--workers", 1)
     notes = place / "out/state/logs"
     until(lambda: notes.is_dir() and len(list(notes.iterdir())) >= 1)
@@ -134,7 +137,7 @@ def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixtur
 def test_a_scheduler_that_is_lost_and_restarted(
     place: Path, started: list[subprocess.Popen[bytes]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     port = free_port()
     started += serve(place, port)
 
@@ -160,7 +163,7 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     port = free_port()
     started += serve(place, port)
     monkeypatch.setattr("terragrip.fleet.cluster.PATIENCE", 3.0)
@@ -193,7 +196,7 @@ def test_a_worker_here_that_dask_gives_up_is_started_anew(
     import dask
     from distributed import Nanny
 
-    write_log(place / "logs/a/long.csv", 7, seconds=1500.0)
+    write_log(place / "logs/a/long.csv", 7, seconds=LONG)
 
     def abandon(busy: list[psutil.Process]) -> None:
         for nanny in Nanny._instances:

@@ -83,21 +83,21 @@ def test_logs_and_data_set_on_s3(
         monkeypatch.setenv(name, value)
     s3 = boto3.client("s3")
     s3.create_bucket(Bucket=BUCKET)
-    for path in (place / "logs").rglob("*.csv"):
+    for path in (place / "logs/b").glob("*.csv"):
         s3.upload_file(str(path), BUCKET, f"logs/{path.name}")
     words = (f"s3://{BUCKET}/logs/*.csv", "--vehicle", place / "Heros.yaml", "-o", f"s3://{BUCKET}/out")
-    for estimated in (6, 0):
+    for estimated in (3, 0):
         assert main(call(place, *words, "--scheduler", f"tcp://127.0.0.1:{port}")) == 0
         printed = capsys.readouterr()
         assert printed.err == ""
-        assert f"{estimated} estimated, {6 - estimated} unchanged, 0 failed" in printed.out
+        assert f"{estimated} estimated, {3 - estimated} unchanged, 0 failed" in printed.out
     # what the store holds, as any other folder
     for one in s3.list_objects_v2(Bucket=BUCKET, Prefix="out/")["Contents"]:
         local = place / one["Key"]
         local.parent.mkdir(parents=True, exist_ok=True)
         s3.download_file(BUCKET, one["Key"], str(local))
     rows, reasons = whole(place / "out")
-    assert (len(rows), reasons) == (6, {})
+    assert (len(rows), reasons) == (3, {})
     files = set(pd.read_parquet(place / "out/summary.parquet")["file"])
     assert {f"/{BUCKET}/out/{file}" for file in files} <= store.refused
     alone = tg.estimate(tg.read(place / "logs/b/drive4.csv"), tg.Vehicle.load(place / "Heros.yaml"))

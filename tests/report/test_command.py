@@ -57,6 +57,7 @@ def test_the_page_holds_every_section_and_loads_nothing(report: Path) -> None:
     assert 'class="omitted"' not in html
     for anchor in (
         "tracking-multi",
+        "wheels-multi",
         "maxima",
         "curves",
         "trust",

@@ -198,6 +198,7 @@ def test_means_are_those_of_the_driven_wheels() -> None:
     assert run.shown_wheel == "f"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_summary_stands_on_top_and_says_what_lacks(tmp_path: Path) -> None:
     for i in range(3):
         made_up.estimates(1000 + i, ("hard",), rows=2400).write(tmp_path / f"hard-{i}.parquet")
@@ -220,13 +221,12 @@ def test_a_summary_stands_on_top_and_says_what_lacks(tmp_path: Path) -> None:
 
 def test_every_wheel_is_drawn_and_told(tmp_path: Path) -> None:
     made_up.estimates(1000, ("hard",)).write(tmp_path / "a.parquet")
-    found = by_anchor(report_of([tmp_path / "a.parquet"]))["wheels-a"]
-    picture, table = found.content
+    run = run_of(tmp_path / "a.parquet")
+    picture, table = wheels.section(run).content
     for wheel in made_up.WHEELS:
         assert re.search(rf">{wheel}<", picture.svg)
     assert isinstance(table, Table)
     assert [row[0] for row in table.rows] == list(made_up.WHEELS)
-    run = run_of(tmp_path / "a.parquet")
     for row in table.rows:
         mean = float(row[1].split(" ±")[0])
         assert mean == pytest.approx(100 * run.estimated(f"slip_{row[0]}").mean(), abs=0.06)

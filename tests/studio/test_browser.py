@@ -476,36 +476,27 @@ EVERYWHERE = {
 """Places, each on another page than the one before, and what is there once they are whole."""
 
 
-def test_axe_finds_nothing(browser: Any, served: Served) -> None:
+def test_axe_finds_nothing(page: Any, served: Served) -> None:
     """No violation of any weight, and nothing wider than the screen: gone to on a narrow one, then on one made wide."""
-    context = browser.new_context(color_scheme="light", bypass_csp=True)
-    tab = context.new_page()
-    tab.set_default_timeout(180_000)
     faults = []
     for where, ready in EVERYWHERE.items():
         for width, themes in ((390, ("light",)), (1280, ("light", "dark"))):
-            tab.set_viewport_size({"width": width, "height": 720})
+            page.set_viewport_size({"width": width, "height": 720})
             if width == 390:
-                tab.goto(f"{served.url}/{where}")
-            tab.wait_for_selector(f"main.page-{where[2:].partition('?')[0]} >> {ready}", state="attached")
+                page.goto(f"{served.url}/{where}")
+            page.wait_for_selector(f"main.page-{where[2:].partition('?')[0]} >> {ready}", state="attached")
             faults += [
-                (where, width, theme, fault) for theme in themes for fault in axe_violations(tab, theme)
+                (where, width, theme, fault) for theme in themes for fault in axe_violations(page, theme)
             ]
-            wide = tab.evaluate("() => document.documentElement.scrollWidth")
+            wide = page.evaluate("() => document.documentElement.scrollWidth")
             faults += [(where, width, "wide", wide)] if wide > width else []
-    context.close()
     assert faults == []
 
 
 @pytest.mark.parametrize(("where", "old"), [("live", "main.stale"), ("cab", ".page-cab.dead")])
-def test_axe_finds_nothing_where_the_numbers_are_old(
-    browser: Any, served: Served, where: str, old: str
-) -> None:
-    context = browser.new_context(color_scheme="light", bypass_csp=True)
-    tab = context.new_page()
-    tab.goto(f"{served.url}/#/{where}?replay=estimates.parquet")
-    tab.wait_for_function(r"() => /\d/.test(document.querySelector('.big, .cab-number')?.textContent ?? '')")
+def test_axe_finds_nothing_where_the_numbers_are_old(page: Any, served: Served, where: str, old: str) -> None:
+    page.goto(f"{served.url}/#/{where}?replay=estimates.parquet")
+    page.wait_for_function(r"() => /\d/.test(document.querySelector('.big, .cab-number')?.textContent ?? '')")
     served.stop()
-    tab.wait_for_selector(old, state="attached")
-    assert [(theme, fault) for theme in ("light", "dark") for fault in axe_violations(tab, theme)] == []
-    context.close()
+    page.wait_for_selector(old, state="attached")
+    assert [(theme, fault) for theme in ("light", "dark") for fault in axe_violations(page, theme)] == []

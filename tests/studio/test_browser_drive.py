@@ -157,10 +157,9 @@ def test_a_replaced_run_is_shown_anew_and_a_removed_one_is_said(
     assert page.locator(".chart").count() == 0
 
 
-@pytest.mark.parametrize("where", ["drive", "map"])
-@pytest.mark.parametrize("path", ["gone.parquet", "broken.parquet"])
+@pytest.mark.parametrize(("where", "path"), [("drive", "gone.parquet"), ("map", "broken.parquet")])
 def test_a_link_to_what_is_not_there_opens_no_other_run(
-    page: Any, served: Served, folder: Path, path: str, where: str
+    page: Any, served: Served, folder: Path, where: str, path: str
 ) -> None:
     (folder / "broken.parquet").write_bytes(b"PAR1 broken")
     page.goto(f"{served.url}/#/{where}?path={path}")

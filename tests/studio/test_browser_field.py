@@ -238,11 +238,8 @@ def test_the_way_is_drawn_when_it_is_asked_for(page: Any, served: Served) -> Non
     page.wait_for_function("before => window.terragripField.ink.toDataURL() !== before", arg=before)
 
 
-def test_axe_finds_nothing(browser: Any, served: Served) -> None:
+def test_axe_finds_nothing(page: Any, served: Served) -> None:
     """No violation of any weight, and nothing wider than the screen."""
-    context = browser.new_context(viewport={"width": 390, "height": 720}, bypass_csp=True)
-    tab = context.new_page()
-    tab.set_default_timeout(180_000)
     faults = []
     for where, ready, themes, width in (
         ("path=nowhere.parquet", "#map-empty", ("light",), 390),
@@ -250,11 +247,10 @@ def test_axe_finds_nothing(browser: Any, served: Served) -> None:
         ("map=none.gpkg", "#map-empty:has-text('none.gpkg')", ("light", "dark"), 1280),
         ("map=field.gpkg&layer=change", "#map[data-cells]", ("light", "dark"), 1280),
     ):
-        tab.set_viewport_size({"width": width, "height": 720})
-        tab.goto(f"{served.url}/#/map?{where}")
-        tab.wait_for_selector(ready, state="attached")
-        faults += [(where, width, theme, fault) for theme in themes for fault in axe_violations(tab, theme)]
-        wide = tab.evaluate("() => document.documentElement.scrollWidth")
+        page.set_viewport_size({"width": width, "height": 720})
+        page.goto(f"{served.url}/#/map?{where}")
+        page.wait_for_selector(ready, state="attached")
+        faults += [(where, width, theme, fault) for theme in themes for fault in axe_violations(page, theme)]
+        wide = page.evaluate("() => document.documentElement.scrollWidth")
         faults += [(where, width, "wide", wide)] if wide > width else []
-    context.close()
     assert faults == []

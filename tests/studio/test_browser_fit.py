@@ -15,7 +15,6 @@ import terragrip as tg
 from served import NEEDS, Served
 from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
-from terragrip.simulation import Scenario
 from terragrip.soil.bins import BY_SLIP, BinSettings
 from terragrip.soil.estimates import soils_of
 from terragrip.soil.fit import AdhesionCurve
@@ -33,18 +32,13 @@ def open_fit(page: Any, served: Served) -> None:
 
 
 def test_bins_by_slip_are_those_of_terragrip_soils_by_slip(page: Any, served: Served, folder: Path) -> None:
-    scenario = Scenario.load("multi1").model_copy(update={"duration": 200.0})
-    tg.simulate(scenario, 0).save(folder / "many")
-    recording, vehicle = tg.read(folder / "many/recording.parquet"), tg.Vehicle.load(folder / "vehicle.yaml")
-    tg.estimate(recording, vehicle).write(folder / "many.parquet")
-    page.goto(f"{served.url}/#/fit?path=many.parquet")
-    page.wait_for_selector("#soil-list li")
+    open_fit(page, served)
     by_pull = page.evaluate(BINS)
     page.select_option("#bins-by", "slip")
     page.wait_for_function(f"n => ({BINS})().length !== n", arg=len(by_pull))
     name = page.evaluate("() => window.terragripFit.state.soils[0].name")
     curve = AdhesionCurve(bins=BinSettings(0.01, 0.05, 0.60, 10, BY_SLIP))
-    soils = soils_of([folder / "many.parquet"], curve, bins={}).soils
+    soils = soils_of([folder / "estimates.parquet"], curve, bins={}).soils
     wanted = [one["mean"] for one in soils[name].curve.bins_.to_list()]
     np.testing.assert_allclose([one["mean"] for one in page.evaluate(BINS)], wanted, rtol=1e-9)
     page.click("#fit-button")

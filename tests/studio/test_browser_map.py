@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served
+from served import NEEDS, Served, leave
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -90,7 +90,7 @@ def test_a_basemap_is_remembered_where_it_was_laid(page: Any, served: Served, fo
     page.fill("#edge-north", "50.5")
     page.click("text=Place it")
     page.wait_for_function("() => window.terragripMap.map.getSource('base')")
-    page.goto("about:blank")
+    leave(page)
     open_map(page, served)
     page.wait_for_function("() => window.terragripMap.map.getSource('base')")
     assert page.evaluate("() => window.terragripMap.map.getSource('base').coordinates[0][1]") == 50.5

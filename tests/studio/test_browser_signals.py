@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from served import AXE, NEEDS, Served
+from served import NEEDS, Served, axe_violations, leave
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -121,7 +121,7 @@ def test_an_overlay_is_in_the_link_and_ends_with_its_run(page: Any, served: Serv
         "() => location.hash.includes('over=distance') && location.hash.includes('with=slow')"
     )
     link = page.url
-    page.goto("about:blank")
+    leave(page)
     page.goto(link)
     page.wait_for_function("() => document.querySelectorAll('.legend-row .run').length === 3")
     assert page.input_value("#over") == "distance"
@@ -171,10 +171,10 @@ def test_a_formula_is_drawn_and_kept_in_link_and_layout(page: Any, served: Serve
     page.fill("#layout-name", "slips")
     page.keyboard.press("Enter")
     page.evaluate("() => localStorage.removeItem('terragrip-formulas')")
-    page.goto("about:blank")
+    leave(page)
     page.goto(link)
     page.wait_for_selector(".chart h2:text-is('Slip difference [%]')")
-    page.goto("about:blank")
+    leave(page)
     open_drive(page, served, "path=estimates.parquet&panels=slip")
     assert page.locator(".chart").count() == 1
     page.click("summary:text-is('Layouts')")
@@ -239,7 +239,7 @@ def test_any_quantity_over_any_other_of_what_the_charts_show(page: Any, served: 
     assert 10 <= float(re.search(r"t ([0-9.]+) s", page.inner_text(".line")).group(1)) <= 12
     page.wait_for_function("() => location.hash.includes('y=measured')")
     link = page.url
-    page.goto("about:blank")
+    leave(page)
     page.goto(link)
     page.wait_for_function("() => document.querySelector('#across-y')?.value.startsWith('measured')")
     assert (page.input_value("#across-x"), page.input_value("#across-y")) == (
@@ -258,15 +258,8 @@ def test_the_plot_shows_each_run_in_its_colour(page: Any, served: Served, three:
     ]
 
 
-@pytest.mark.parametrize(("theme", "width"), [("light", 1280), ("dark", 390)])
-def test_overlay_formulas_and_plot_have_no_faults_and_fit(
-    browser: Any, served: Served, three: Path, theme: str, width: int
-) -> None:
+def test_overlay_formulas_and_plot_have_no_faults_and_fit(page: Any, served: Served, three: Path) -> None:
     (three / f"{'Feldversuch_' * 6}3.parquet").write_bytes((three / "slow.parquet").read_bytes())
-    context = browser.new_context(
-        viewport={"width": width, "height": 800}, color_scheme=theme, bypass_csp=True
-    )
-    page = context.new_page()
     open_drive(
         page,
         served,
@@ -274,19 +267,17 @@ def test_overlay_formulas_and_plot_have_no_faults_and_fit(
         "&with=late.parquet&with=slow.parquet&x=ground_speed&y=slip_rr",
     )
     page.wait_for_function("() => document.querySelectorAll('.legend-row .run').length === 3")
-    boxes = []
-    page.add_script_tag(path=str(AXE))
-    for menu in ("#formulas", "#overlay"):
-        page.click(f"{menu} summary")
-        found = page.evaluate("async () => (await axe.run()).violations.map((v) => [v.id, v.nodes[0].html])")
-        assert found == []
-        cut = page.locator(f"{menu} .menu").evaluate("e => e.scrollWidth - e.clientWidth")
-        assert cut <= 0  # long names ran out of the menu
-        boxes.append(page.locator(f"{menu} .menu").bounding_box())
-    wide = page.evaluate("() => document.documentElement.scrollWidth")
-    context.close()
-    assert all(0 <= box["x"] <= box["x"] + box["width"] <= width for box in boxes)
-    assert wide <= width
+    for theme, width in (("light", 1280), ("dark", 390)):
+        page.set_viewport_size({"width": width, "height": 800})
+        for menu in ("#formulas", "#overlay"):
+            page.click(f"{menu} summary")
+            assert axe_violations(page, theme) == []
+            cut = page.locator(f"{menu} .menu").evaluate("e => e.scrollWidth - e.clientWidth")
+            assert cut <= 0  # long names ran out of the menu
+            box = page.locator(f"{menu} .menu").bounding_box()
+            assert 0 <= box["x"] <= box["x"] + box["width"] <= width
+            page.click(f"{menu} summary")
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
 
 
 def test_the_keyboard_lays_a_run_over_and_makes_a_formula(page: Any, served: Served, three: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served
+from served import NEEDS, Served, leave
 from terragrip.estimation import Estimates
 from terragrip.ground.events import events
 
@@ -99,7 +99,7 @@ def test_the_picked_sample_is_marked_and_is_in_the_link(page: Any, served: Serve
     picked = page.inner_text(".sample strong")
     page.wait_for_function("() => location.hash.includes('at=')")
     link = page.url
-    page.goto("about:blank")
+    leave(page)
     page.goto(link)
     page.wait_for_selector(".why")
     assert page.inner_text(".sample strong") == picked
@@ -118,7 +118,7 @@ def test_a_link_opens_the_same_view(page: Any, served: Served) -> None:
     )
     link = page.url
     page.evaluate("() => localStorage.clear()")
-    page.goto("about:blank")
+    leave(page)
     page.goto(link)
     page.wait_for_function(f"() => ({RANGE})().join() === '10,20'")
     assert page.locator(".chip[aria-pressed='true']").all_inner_texts() == ["rr"]
@@ -208,7 +208,7 @@ def test_a_layout_is_kept_by_name(page: Any, served: Served) -> None:
     page.fill("#layout-name", "honesty")
     page.keyboard.press("Enter")
     page.wait_for_selector("#layouts button:text-is('honesty')")
-    page.goto("about:blank")
+    leave(page)
     open_drive(page, served, "path=estimates.parquet&panels=slip,speed&wheels=rr")
     assert page.locator(".chart").count() == 2
     page.click("summary:text-is('Layouts')")

@@ -131,8 +131,13 @@ def test_ground_and_report_follow_from_estimates(client: TestClient, folder: Pat
     ground = queued(client, "ground", estimates=runs, library="soils.json", output="ground.json")
     assert (ground["state"], ground["text"][:10]) == ("done", "estimates:")
     assert ground["command"] == "terragrip ground estimates.parquet --library soils.json --output ground.json"
-    report = queued(client, "report", estimates=runs, ground="ground.json", title="A day", output="day.html")
-    assert report["state"] == "done"
+    wanted = {"estimates": runs, "ground": "ground.json", "title": "A day", "output": "day.html"}
+    report = client.post("/api/jobs/report", json=wanted).json()
+    assert report["command"] == (
+        "terragrip report estimates.parquet --ground ground.json '--title=A day' --output day.html"
+    )
+    client.delete(f"/api/jobs/{report['id']}")  # one is run to its end by test_browser_new_user.py
+    (folder / "day.html").write_text("<h1>A day</h1>", encoding="utf-8")
     shown = client.get("/api/report?path=day.html")
     assert "A day" in shown.text
     assert shown.headers["content-security-policy"].startswith("sandbox; default-src 'none'")
