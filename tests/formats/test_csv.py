@@ -531,6 +531,46 @@ def test_a_header_of_two_rows_names_the_columns_by_group_where_a_name_alone_does
     } <= found.keys()
 
 
+def test_a_sheet_saved_with_title_lines_and_merged_cells_is_read_whole(tmp_path: Path) -> None:
+    """A spreadsheet fills every line with separators: the title was the one column, and merged cells left their group's first."""
+    rows = [[f"{k / 10}", *[f"{k % 7 + n},5" for n in range(5)], ""] for k in range(40)]
+    text = [
+        "Zugversuch Feld 3;;;;;;",
+        "Fahrer: M.;Gang: 3;;;;;",
+        ";;;;;;",
+        "Temps;Roues;;Couples;;Vitesse;Note",
+    ]
+    text += [
+        "(s);AVG (tr/min);AVD (tr/min);AVG (N.m);AVD (N.m);avance (km/h);",
+        *map(";".join, rows),
+        ";;;;;;",
+        ";;;;;;",
+    ]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(text) + "\n")
+    table = read_table(log)
+    assert table.names == (
+        "Temps",
+        "Roues AVG",
+        "Roues AVD",
+        "Couples AVG",
+        "Couples AVD",
+        "Vitesse avance",
+        "Note",
+    )
+    assert table.units["Temps"] == "s"
+    assert table.units["Couples AVD"] == "N.m"
+    assert table.columns["Vitesse avance"].tolist() == [k % 7 + 4.5 for k in range(40)]
+    found = inspect(log).proposals
+    assert {
+        "wheel_speed_fl",
+        "wheel_speed_fr",
+        "drive_torque_fl",
+        "drive_torque_fr",
+        "ground_speed",
+    } <= found.keys()
+
+
 def test_names_with_blanks_hide_no_tab_where_cells_are_missing(tmp_path: Path) -> None:
     """Blanks made more cells numbers than tabs did."""
     names = ["time", "ground speed", "wheel speed fl", "wheel speed fr"]

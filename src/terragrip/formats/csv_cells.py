@@ -29,8 +29,8 @@ _MISSING = [
 def body_of(
     data: bytes, dialect: Dialect, start: int, *, more: bool = False
 ) -> tuple[bytes | memoryview, Dialect, list[str]]:
-    """The rows from ``start`` on, how they are then written, and notes: a last line that was cut off while writing is left out, runs
-    of blanks become tabs.
+    """The rows from ``start`` on, how they are then written, and notes: a last line that was cut off while writing is left out, and so
+    are empty lines of a spreadsheet at the end; runs of blanks become tabs.
 
     ``more``: there are rows before these.
     """
@@ -42,6 +42,9 @@ def body_of(
         if (last > start or more) and data[last:].strip() and len(cells) < len(dialect.names):
             body = memoryview(data)[start:last]
             notes.append("The last row is cut off and was left out.")
+    ends = data.find(b"\n", len(data.rstrip(b" \t\r\n" + dialect.separator.encode()))) + 1
+    if ends:  # what stands behind is lines of separators
+        body = body[: max(ends - start, 0)]
     if dialect.separator == " ":
         body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
         dialect = replace(dialect, separator="\t")

@@ -107,19 +107,27 @@ def _unit_in_all(cells: tuple[str, ...]) -> str | None:
 def _under_groups(groups: list[str], lines: list[str], separator: str, decimal: str) -> list[str] | None:
     """The names of a header of two rows, where the first names groups of columns (``groups``, empty behind each); None of any other.
 
-    A name that stands in several groups has its group's before it.
+    A name that stands in several groups, or alone in one, has its group's before it; below a group of one may stand but a unit, or nothing.
     """
-    if len(lines) < 4 or 3 * groups.count("") < len(groups) or not groups[0]:
+    if len(lines) < 4 or "" not in groups[1:] or not groups[0]:
         return None
-    names, third = split(lines[1], separator), split(lines[2], separator)
-    if len(names) != len(groups) or not all(_NAME.match(name) for name in names):
+    names = split(lines[1], separator)
+    if len(names) != len(groups) or any(_is_number(name, decimal) for name in names):
         return None
-    if _is_units_row(names, third, decimal):
+    if not all(
+        _NAME.match(name) and not is_common(_bare(name))
+        for own, name in zip(groups, names, strict=True)
+        if not own
+    ):
         return None
+    alone = [_WITH_UNIT.sub(r"\1", name) for name in names]
     whole, group = [], ""
-    for own, name in zip(groups, names, strict=True):
+    for own, name, bare, after in zip(groups, names, alone, [*groups[1:], "end"], strict=True):
         group = own or group
-        whole.append(f"{group} {name}" if names.count(name) > 1 else name)
+        if own and (not name or is_common(_bare(name))):
+            whole.append(f"{own} [{_bare(name)}]" if _bare(name) else own)
+        else:
+            whole.append(f"{group} {name}" if alone.count(bare) > 1 or (own and after) else name)
     return whole
 
 
@@ -132,12 +140,18 @@ def _preamble(lines: list[str]) -> int:
         width = max(set(rows), key=rows.count)
         if width < 2 or rows.count(width) < 0.9 * len(rows):
             continue
-        if widths[0] > 1 and widths[0] >= 0.75 * width:
+        # a spreadsheet fills all lines with separators: what is empty behind the last cell with a text is no width
+        filled = [len(split(line.rstrip(f"{separator} \t"), separator)) for line in lines]
+        if widths[0] >= 0.75 * width and filled[0] > max(1, 0.5 * width):
             return 0  # the header, though it may lack a name
-        header = next((k for k, own in enumerate(widths) if own in (width, width + 1)), len(lines))
+        usual = zip(widths, filled, strict=True)
+        header = next(
+            (k for k, (own, to) in enumerate(usual) if own in (width, width + 1) and to > 0.5 * width),
+            len(lines),
+        )
         if not 0 < header <= min(_LONGEST_PREAMBLE, len(lines) - 2):
             continue
-        cells = split(lines[header], separator)
+        cells = [cell for cell in split(lines[header], separator) if cell]
         if sum(bool(_NAME.match(cell)) for cell in cells) > len(cells) / 2:
             best = max(best, (width, header))
     return best[1]

@@ -81,7 +81,7 @@ _CORNERS = {
     **dict.fromkeys(("ml", "lm"), "ml"), **dict.fromkeys(("mr", "rm"), "mr"),
 }  # fmt: skip
 _FRENCH_CORNERS = {"avg": "fl", "avd": "fr", "arg": "rl", "ard": "rr"}
-_FRENCH = ("roue", "couple", "vitesse", "regime")
+_FRENCH = ("roue", "roues", "couple", "couples", "vitesse", "vitesses", "regime", "regimes")
 """Beside one of these words ``avg`` is *avant gauche*; elsewhere it is an average."""
 UNIT_WORDS = {
     "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
@@ -110,6 +110,8 @@ _AXIS_SYMBOLS = {"a": "acceleration", "g": "gyro", "w": "gyro", "v": "speed", "f
 _COMPASS = {"n": "north", "e": "east", "d": "vertical", "u": "vertical"}
 _ELISION = re.compile(r"\b[dl]['\u2019](?=\w)", re.IGNORECASE)
 """vitesse d'avancement"""
+_PLURAL = re.compile(r"(\w{4,}?)(?:s|en?|n)")
+"""Groups of columns: torques, roues, Drehmomente, Raddrehzahlen."""
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
@@ -173,9 +175,11 @@ class Vocabulary:
             return frozenset([word])
         if len(word) < 3 or not word.isalpha():
             return frozenset()
-        for cut in range(3, len(word) - 2):
-            if word[:cut] in known and word[cut:] in known:
-                return frozenset([word[:cut], word[cut:]])
+        plural = None if word in UNIT_WORDS else _PLURAL.fullmatch(word)
+        for one in (word, plural[1]) if plural else (word,):
+            parts = {one} if one in known else self._two_in(one)
+            if parts and (one == word or "statistic" not in map(known.get, parts)):  # joint_states: a message
+                return frozenset(parts)
         if self._has_symbol(word) or self._is_derivative(word):
             return frozenset([word[1:]])
         tail = next((w for w in known if len(w) >= 5 and word.endswith(w)), None)
@@ -186,6 +190,12 @@ class Vocabulary:
             return frozenset()
         bare = word == _VOWELS.sub("", word)
         return frozenset(full for full, concept in known.items() if _is_cut(word, bare, full, concept))
+
+    def _two_in(self, word: str) -> set[str]:
+        """The two known words that a word is put together of, if any."""
+        cuts = range(3, len(word) - 2)
+        parts = ({word[:cut], word[cut:]} for cut in cuts)
+        return next((two for two in parts if two <= self._known.keys()), set())
 
     def _has_symbol(self, word: str) -> bool:
         """vWheel, TMotor: a physicist's letter before what it is of."""
