@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +37,9 @@ def picture(made: FieldMap) -> Figure:
         title = QUANTITIES[quantity]
         if quantity == "adhesion":
             title = title.replace("the reference slip", f"{100 * made.reference_slip:g} % slip")
+        title = fill(
+            title, int((wide / 2 - 1.1) / 0.07)
+        )  # above its own panel: a colour bar's end hid the rest
         scale, deviation = 1.0, "its standard deviation [-]"
         if quantity in SHARES:
             scale, title, deviation = 100.0, title.replace("[-]", "[%]"), deviation.replace("[-]", "[%]")
