@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.loads import GRAVITY, wheel_shares
+from terragrip.physics.slip import hub_speed, middle_speed
 from terragrip.recording import Recording
 from terragrip.recording.window_means import window_means
 from terragrip.vehicle import Vehicle
@@ -84,9 +85,9 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     bin_of = ((recording.time - recording.time[0]) / length).astype(np.intp)
     n, wheels = int(bin_of[-1]) + 1, vehicle.wheels
 
-    def mean(name: str, absent: float = np.nan) -> Floats:
+    def mean(name: str, absent: float = np.nan, power: int = 1) -> Floats:
         values = recording.channels.get(name)
-        return np.full(n, absent) if values is None else window_means(values, bin_of, n)
+        return np.full(n, absent) if values is None else window_means(values**power, bin_of, n)
 
     def samples(name: str) -> Floats:
         values = recording.channels.get(name)
@@ -96,7 +97,12 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     def per_wheel(quantity: str) -> Floats:
         return np.stack([mean(f"{quantity}_{wheel}") for wheel in wheels], axis=1)
 
-    speed, wheel_speed = mean("ground_speed"), per_wheel("wheel_speed")
+    yaw, lateral = mean("angular_velocity_z"), mean("acceleration_y")
+    turn = np.nan_to_num(yaw)
+    ahead, side = vehicle.receiver
+    speed = middle_speed(mean("ground_speed"), turn, ahead=ahead, side=side)
+    wheel_speed = per_wheel("wheel_speed")
+    across = np.sqrt(np.nan_to_num(mean("angular_velocity_z", power=2)))[:, None] * vehicle.wheel_ahead
     pitch, measured = mean("pitch"), mean("acceleration_x")
     slope = np.nan_to_num(pitch)
     kinematic = _rate(speed, length) + GRAVITY * np.sin(slope)
@@ -105,7 +111,6 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     wheel_acceleration = _rate(wheel_speed, length)
     travelled = np.cumsum(np.nan_to_num(np.abs(speed))) * length
     behind = (vehicle.axle_to_rear[0] - vehicle.axle_to_rear)[vehicle.wheel_axle]
-    yaw, lateral = mean("angular_velocity_z"), mean("acceleration_y")
     torque = per_wheel("drive_torque")
     torque[:, ~vehicle.driven] = np.nan_to_num(torque[:, ~vehicle.driven])
     spin = np.nansum(vehicle.wheel_inertia * wheel_acceleration, axis=1)
@@ -137,7 +142,8 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         pitch=pitch,
         yaw_rate=yaw,
         lateral=lateral,
-        hub_speed=speed[:, None] - np.nan_to_num(yaw)[:, None] * vehicle.wheel_side,
+        # a steered wheel's way grows with the square of the turn, so the mean's does with its mean square
+        hub_speed=hub_speed(speed[:, None] - turn[:, None] * vehicle.wheel_side, across),
         wheel_speed=wheel_speed,
         wheel_acceleration=wheel_acceleration,
         torque=torque,
