@@ -28,6 +28,16 @@ FORMS = "give seconds, 10:00:00.5 or 2024-04-03 10:00:00.5"
 """What a time may be written as, for a message."""
 
 
+def moment(seconds: float) -> str:
+    """A time [s] as a sentence names it: four digits, and tenths of however many seconds, as a log of a day or since 1970 has them."""
+    return f"{seconds:.4g}" if abs(seconds) < 1000 else f"{round(seconds, 1):.12g}"
+
+
+def span(start: float, end: float) -> str:
+    """A stretch of a log [s] as a sentence names it: ``from 12.5 to 20 s``."""
+    return f"from {moment(start)} to {moment(end)} s"
+
+
 def times_of(
     cells: Sequence[str | None], order: str | None = None
 ) -> npt.NDArray[np.float64] | npt.NDArray[np.datetime64] | None:

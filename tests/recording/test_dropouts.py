@@ -26,6 +26,15 @@ def test_a_channel_that_alone_drops_to_0_is_named(name: str, what: str) -> None:
     )
 
 
+@pytest.mark.parametrize("zero", [20_000.0, 1.7e9])
+def test_where_a_stretch_is_can_be_read_late_in_a_day_and_since_1970(zero: float) -> None:
+    """'from 1.713e+09 to 1.713e+09 s' named no row."""
+    values = np.where((TIME >= 20) & (TIME <= 30), 0.0, log().channels["wheel_speed_l"])
+    whole = log(wheel_speed_l=values)
+    (note,) = dropout_warnings(Recording(time=zero + whole.time, channels=whole.channels))
+    assert f"from {zero + 20:.0f} to {zero + 30:.0f} s while" in note
+
+
 def test_a_drive_and_an_axle_that_is_off_say_nothing() -> None:
     rows = (TIME >= 20) & (TIME <= 30)
     assert dropout_warnings(log()) == []

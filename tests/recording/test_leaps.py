@@ -76,7 +76,7 @@ def test_a_zero_that_moves_is_named(
     found = notes(changed(drive(vehicle), names, gain, offset), vehicle)
     (note,) = (note for note in found if "neither the motion nor another force answers" in note)
     assert note.startswith(", ".join(names))
-    assert " at 59.97" in note
+    assert " at 59.98 s" in note
 
 
 def test_a_drawbar_cell_or_torques_that_fall_to_0_are_named(vehicle: Vehicle) -> None:

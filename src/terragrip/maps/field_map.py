@@ -94,6 +94,7 @@ class MapMaker:
     _soil: list[SoilWay] = field(default_factory=list)
     _points: list[Points] = field(default_factory=list)
     _machines: set[str] = field(default_factory=set)
+    _bare: list[str] = field(default_factory=list)
 
     def add(self, estimates: Estimates, run: str, file: str | None = None) -> None:
         """Add one run. Raises InputError if it has no positions, or impossible ones; ``file`` is named there."""
@@ -114,9 +115,7 @@ class MapMaker:
         self._machines.add(str(estimates.about.get("vehicle")))
         self.notes += [f"{run}: {note}" for note in places.notes]
         if vehicle.antenna is None:
-            self.notes.append(
-                f"{run}: the vehicle file has no antenna; it is assumed to be over the rear axle."
-            )
+            self._bare.append(run)
         for reading in readings_of(estimates, places, self._slip, self.library):
             pieces = pieces_of(reading, estimates.time, way, self._cell, number, places.headland)
             self._parts.setdefault(reading.quantity, []).append(pieces)
@@ -160,6 +159,11 @@ class MapMaker:
         """The map of the added runs. Raises InputError if there are none, or no row counts."""
         if not self.runs:
             raise InputError("there is no run to map", hint="give files written by 'terragrip estimate'")
+        if self._bare:
+            which = ", ".join(self._bare) if len(self._bare) < 4 else f"{len(self._bare)} runs"
+            self.notes.append(
+                f"{which}: the vehicle file has no antenna; it is assumed to be over the rear axle."
+            )
         cells: dict[str, Cells] = {}
         passes: dict[str, Cells] = {}
         for quantity in (name for name in QUANTITIES if name in self._parts):

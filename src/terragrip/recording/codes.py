@@ -14,6 +14,7 @@ from terragrip.recording.noise import MAD_TO_SD
 from terragrip.recording.ranks import median
 from terragrip.recording.schema import split_channel
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import moment
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -57,7 +58,7 @@ def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Record
         seen = (
             f"and at most {np.nanmax(np.abs(channels[name])):.3g} in all others"
             if beyond
-            else f"(the first at {recording.time[np.argmax(bad)]:.5g} s), and leaps there and back"
+            else f"(the first at {moment(recording.time[np.argmax(bad)])} s), and leaps there and back"
         )
         notes.append(
             f"{name} is {shown} in {bad.sum()} rows {seen}: a code for "

@@ -16,6 +16,7 @@ from terragrip.recording.lag import is_copy
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import quantile
 from terragrip.recording.stretches import is_one_value
+from terragrip.written_times import span
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -97,7 +98,7 @@ def replay_warnings(recording: Recording) -> list[str]:
         recording.time[kept[k]] for k in (first, last, first - distance, last - distance)
     )
     return [
-        f"The rows from {start:.5g} to {end:.5g} s repeat those from {before:.5g} to {until:.5g} s to the last digit: the logger wrote a "
+        f"The rows {span(start, end)} repeat those {span(before, until)} to the last digit: the logger wrote a "
         "buffer twice. Leave the second ones out."
     ]
 

@@ -16,6 +16,7 @@ from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names, speed_names
 from terragrip.recording.stretches import DRIVING, LONG, is_one_value, longest, may_last
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import span
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -68,7 +69,7 @@ def _zeros(
     if not stretch or min(rows.sum(), others.sum()) * means.length < LONG:
         return None
     verb = "are" if len(names) > 1 else "is"
-    text = f"{', '.join(names)} {verb} exactly 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while"
+    text = f"{', '.join(names)} {verb} exactly 0 {span(*stretch)} while"
     return rows, others, text
 
 
@@ -93,7 +94,7 @@ def _wheels(recording: Recording) -> list[str]:
     for stretch, names in stretches.items():
         few = len(names) == 1
         notes.append(
-            f"{', '.join(names)} {'is' if few else 'are'} 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while the vehicle drives: "
+            f"{', '.join(names)} {'is' if few else 'are'} 0 {span(*stretch)} while the vehicle drives: "
             f"{'the wheel is locked, or its sensor' if few else 'the wheels are locked, or their sensors'} lost the signal. If "
             f"{'it' if few else 'they'} did, leave these cells empty."
         )
@@ -116,7 +117,7 @@ def _ground(recording: Recording) -> list[str]:
     if not stretch:
         return []
     return [
-        f"ground_speed is 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while all wheels turn: the vehicle is stuck, or its sensor lost "
+        f"ground_speed is 0 {span(*stretch)} while all wheels turn: the vehicle is stuck, or its sensor lost "
         "the signal. If it did, leave these cells empty."
     ]
 
@@ -129,7 +130,7 @@ def _torques(recording: Recording) -> list[str]:
         others = [other != 0.0 for one, other in torques.items() if one != name]
         if others and (stretch := _lost(recording, name, np.logical_and.reduce(others), values)):
             notes.append(
-                f"{name} is 0 from {stretch[0]:.4g} to {stretch[1]:.4g} s while all other torques are not: its sensor lost the signal, "
+                f"{name} is 0 {span(*stretch)} while all other torques are not: its sensor lost the signal, "
                 "or its motor is off. If the sensor did, leave these cells empty."
             )
     return notes

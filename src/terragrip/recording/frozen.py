@@ -17,6 +17,7 @@ from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
 from terragrip.recording.turns import filled
+from terragrip.written_times import span
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -92,13 +93,15 @@ def _together(recording: Recording, speeds: dict[str, Floats]) -> list[str]:
     if not any(_range(v[rows]) > 0 for n, v in changing.items() if n not in moved):
         return [_hung(stretch)]
     return [
-        f"All speeds keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s while other channels go on: not measured, it seems. "
+        f"All speeds keep their values {span(*stretch)} while other channels go on: not measured, it seems. "
         "Leave these cells empty: the intervals then show how little is known."
     ]
 
 
 def _hung(stretch: tuple[float, float]) -> str:
-    return f"All channels keep their values from {stretch[0]:.4g} to {stretch[1]:.4g} s: the logger hung, it seems. Leave these rows out."
+    return (
+        f"All channels keep their values {span(*stretch)}: the logger hung, it seems. Leave these rows out."
+    )
 
 
 def _is_restless(time: Floats, values: Floats) -> bool:
@@ -172,7 +175,7 @@ def _repeats(
         return []
     seconds, start, value = max(found)
     return [
-        f"{name} repeats {value:.4g} from {start:.4g} to {start + seconds:.4g} s"
+        f"{name} repeats {value:.4g} {span(start, start + seconds)}"
         + (f", and {len(found) - 1} times more," if len(found) > 1 else "")
         + f" while other {'forces' if forces else 'speeds' if 'speed' in name else 'channels'} change: not measured, it seems. Leave "
         "these cells empty: the intervals then show how little is known."

@@ -23,6 +23,7 @@ from terragrip.recording.schema import unit_of
 from terragrip.recording.stretches import DRIVING, LONG, gaps
 from terragrip.recording.turns import filled
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import moment
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -158,7 +159,7 @@ def _sentence(recording: Recording, drive: _Drive, names: tuple[str, ...], insta
     to = ", ".join(f"from {value[k]:.3g} to {value[k + 1]:.3g}" for value in values)
     leap, stay, their = ("leap", "stay", "their") if len(names) > 1 else ("leaps", "stays", "its")
     return (
-        f"{', '.join(names)} {leap} {to} {unit_of(names[0])} at {drive.middle[k]:.5g} s"
+        f"{', '.join(names)} {leap} {to} {unit_of(names[0])} at {moment(drive.middle[k])} s"
         + (f", and {times} times more," if times else "")
         + f" and {stay} there, while neither the motion nor another force answers: {their} zero moved, or the signal was lost. Estimates "
         "are wrong by it before or after: correct these cells, or leave them empty."

@@ -22,6 +22,7 @@ from terragrip.recording.schema import rim_names
 from terragrip.recording.window_means import window_means
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import moment
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -163,7 +164,8 @@ def shortfall_warnings(recording: Recording, means: Means | None) -> list[str]:
     inside = rest[known[first : last + 1]]
     begin, end = recording.time[0] + (np.flatnonzero(means.rows)[known[[first, last]]] + 0.5) * means.length
     return [
-        f"From about {begin:.4g} to {end:.4g} s the drive torques over the wheel radius less drawbar_force are {-np.mean(inside):.2g} of "
+        f"From about {moment(begin)} to {moment(end)} s the drive torques over the wheel radius less drawbar_force are "
+        f"{-np.mean(inside):.2g} of "
         "the weight too little to move the vehicle, even without resistance: the zero of drawbar_force drifts, or the scale of one of them "
         "changed. Correct these cells, or leave them empty."
     ]

@@ -12,6 +12,7 @@ from terragrip.recording.stretches import step_of
 from terragrip.recording.window_means import window_means
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import moment
 
 if TYPE_CHECKING:
     from terragrip.recording.mechanics import Means
@@ -79,7 +80,7 @@ def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[s
     at, leap = step
     when = recording.time[0] + (np.flatnonzero(means.rows)[known][at] - 0.5) * means.length
     return [
-        f"From {when:.4g} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
+        f"From {moment(when)} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
         f"before: the zero of one of the two moved, and soil resistance is {abs(leap) / STANDARD_GRAVITY:.2g} off before or after. Correct "
         "it there, or calibrate and estimate both parts apart."
     ]

@@ -16,6 +16,7 @@ from terragrip.recording.sides import Axle, Drive
 from terragrip.recording.stretches import DRIVING, instant_of, step_of
 from terragrip.recording.track import Track
 from terragrip.recording.turns import WINDOW, filled
+from terragrip.written_times import moment
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -100,8 +101,8 @@ def _of_axle(
             factor, name = 1 / factor, names[1]
     wrong = "slip" if speed else "adhesion"
     return [
-        f"From {instant:.5g} s on {name} is {factor:.2f} times what it was before beside the axle's other wheel, from one sample to the "
-        f"next{either}: its scale changed, and {wrong} is off by as much before or after. Correct it there, or estimate both parts apart."
+        f"From {moment(instant)} s on {name} is {factor:.2f} times what it was before beside the axle's other wheel, from one sample to "
+        f"the next{either}: its scale changed, and {wrong} is so far off before or after. Correct it there, or estimate the parts apart."
     ]
 
 
@@ -134,5 +135,5 @@ def _ground(recording: Recording, track: Track | None) -> list[str]:
         return []
     return [
         f"From about {when[starts][step[0]]:.4g} s on ground_speed is {np.exp(step[1]):.2f} times what it was before beside the "
-        "positions' speed: its scale changed, and slip is off by as much before or after. Correct it there, or estimate both parts apart."
+        "positions' speed: its scale changed, and slip is off by as much before or after. Correct it there, or estimate the parts apart."
     ]

@@ -16,6 +16,7 @@ from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, side_differences, windows
 from terragrip.recording.wrong_sign import WrongSign
+from terragrip.written_times import span
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -76,7 +77,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     slides = longest(time, moving & (rim > 0) & (speed < 0), np.ones(len(time), dtype=bool))
     if slides:
         return [
-            f"ground_speed is negative from {slides[0]:.4g} to {slides[1]:.4g} s while the wheels turn forward: its sign is wrong there, "
+            f"ground_speed is negative {span(*slides)} while the wheels turn forward: its sign is wrong there, "
             "unless the vehicle slid backward."
         ]
     if not moving.any():

@@ -17,6 +17,7 @@ from terragrip.recording.stretches import longest
 from terragrip.recording.turns import side_differences, straight_rows
 from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
+from terragrip.written_times import span
 
 if TYPE_CHECKING:
     from terragrip.recording.mechanics import Means
@@ -172,7 +173,7 @@ def slower_warnings(
         else "their speeds are"
     )
     return [
-        f"From {first:.4g} to {last:.4g} s the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
+        f"{span(first, last).capitalize()} the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
         f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
         + ("" if turn is None else _by_a_turn(vehicle, means, turn, (when >= first) & (when <= last)))
     ]
