@@ -152,3 +152,24 @@ def test_wheels_go_by_the_vehicles_own_names(tmp_path: Path) -> None:
     assert {f"wheel_speed_{wheel}" for wheel in german().wheels} <= proposals.keys()
     assert proposals["wheel_speed_hl"].unit == "rpm"
     assert not any(name.endswith(("_fl", "_rr")) for name in proposals)
+
+
+def test_the_wheels_of_a_single_axle_that_is_counted_go_by_the_vehicles_names(tmp_path: Path) -> None:
+    """Proposed as l and r, which the vehicle does not have, the log was refused."""
+    axles = {"axle": {"mass": 420, "wheels": ["1l", "1r"]}}
+    told = {"mass": 420, "axles": axles, "wheel": {"radius": 0.3, "inertia": 1.6}}
+    content = table()
+    content.columns = [
+        *NAMES[:2],
+        "other",
+        "another",
+        "Raddrehzahl 1L [1/min]",
+        "Raddrehzahl 1R [1/min]",
+        *NAMES[6:],
+    ]
+    content.to_csv(tmp_path / "a.csv", index=False)
+    proposals = inspect(tmp_path / "a.csv", vehicle=Vehicle.from_dict(told)).proposals
+    assert {name for name in proposals if name.startswith("wheel_speed")} == {
+        "wheel_speed_1l",
+        "wheel_speed_1r",
+    }

@@ -85,10 +85,11 @@ class RimUnit:
 
 
 def own_name(vehicle: Vehicle | None, wheel: str, vocabulary: Vocabulary = GENERAL) -> str:
-    """The name that a vehicle has for a wheel which a log names by its corner (vl for fl); the log's where it has none such."""
+    """The name that a vehicle has for a wheel of a corner or side in a log (vl for fl, 1l for l); the log's where it has none such."""
     if vehicle is None or wheel in vehicle.wheels:
         return wheel
-    meant = [one for one in vehicle.wheels if vocabulary.read(f"wheel_speed_{one}").wheel == wheel]
+    read = {one: vocabulary.read(f"wheel_speed_{one}").wheel for one in vehicle.wheels}
+    meant = [one for one, place in read.items() if wheel in (place, place.lstrip("0123456789"))]
     return meant[0] if len(meant) == 1 else wheel
 
 
