@@ -54,3 +54,18 @@ def test_between_fixes_a_track_is_known_for_two_seconds_on_either_side() -> None
     speed = track.at("speed", when)
     assert np.isnan(speed).tolist() == [True, False, False, False, True, True, False, False, True]
     np.testing.assert_allclose(speed[[2, 3, 6]], 1.0 + 0.1 * when[[2, 3, 6]])
+
+
+def test_where_positions_jump_to_another_correction_no_turn_is_known() -> None:
+    """A lane of 3 m for a minute: each jump was a turn, and adhesion three times as far off, without a word."""
+    time = np.arange(0.0, 60.0, 0.1)
+    aside = np.where((time > 20) & (time < 40), 3.0, 0.0) + 0.02 * np.random.default_rng(3).standard_normal(
+        len(time)
+    )
+    channels = {"latitude": 48.0 + 2.0 * time / 111_200.0, "longitude": 11.0 + aside / 74_400.0}
+    track = track_of(Recording(time, channels), 4.0)
+    assert track is not None
+    np.testing.assert_allclose(track.jumps, [20.1, 40.0], atol=0.11)
+    near = (np.abs(track.time[:, None] - [20.05, 39.95]) < 2.1).any(axis=1)
+    assert np.isnan(track.turn[near]).mean() > 0.9
+    assert np.nanmax(np.abs(track.turn)) < 0.05

@@ -15,6 +15,7 @@ from terragrip.recording.survey import joined
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.window_means import averaged
 from terragrip.vehicle import Vehicle
+from terragrip.written_times import moment
 
 _YAW_RATE = "angular_velocity_z"
 _KEPT = 1.0  # s that the estimator goes on with a rate of turn
@@ -99,6 +100,8 @@ def _turn_in(log: LogBlocks, sample: Recording, vehicle: Vehicle) -> tuple[Shown
     said = "The rate of turn is that of the positions."
     if _YAW_RATE in channels:
         said = f"{_YAW_RATE} falls silent where the machine turns: the rate of turn is that of the positions there."
+    if len(track.jumps):
+        said += f" They jump {len(track.jumps)} times, first at {moment(track.jumps[0])} s: it is not known there."
     return shown, [said, *_unseen_turns(sample.with_channels(**{_YAW_RATE: shown.over(sample)}), rims)]
 
 

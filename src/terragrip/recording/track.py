@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,8 @@ _VAGUE_TURN = 0.03  # rad/s, and
 _VAGUE_GRADE = 0.02  # rad: SDs above which no value is given
 _GRADE_WAY = 16.0  # m
 _FEWEST = 10  # fixes
+_JUMP = 1.0  # m, and
+_BEYOND = 8.0  # times the scatter of the steps: a receiver that takes another correction
 _DENSE = 40
 """Fixes a window: denser ones, as of positions interpolated to the rate of the wheels, count as their means."""
 _BLOCK = 200_000
@@ -34,7 +36,7 @@ _BLOCK = 200_000
 @dataclass(frozen=True)
 class Track:
     """At each fix: ``time`` (n,) [s], ``north`` and ``east`` (n,) [m], ``speed`` (n,) [m/s], ``turn`` (n,) [rad/s, to the left] and
-    ``grade`` (n,) [rad, uphill], from ``altitude`` (n,) [m]; ``gap`` (n,): whether fixes are missing there.
+    ``grade`` (n,) [rad, uphill], from ``altitude`` (n,) [m]; ``gap`` (n,): whether fixes are missing or jump there; ``jumps`` (k,) [s].
 
     ``turn`` and ``grade`` are NaN where the vehicle hardly moves, or the positions are too noisy; ``grade`` too without altitude.
     """
@@ -46,6 +48,7 @@ class Track:
     turn: Floats
     altitude: Floats
     gap: Bools
+    jumps: Floats = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def grade(self) -> Floats:
@@ -100,10 +103,21 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (ve * an - vn * ae) / speed**2  # x east, y north: to the left is positive
     reach = (time[2 * half :] - time[middle]) - (time[: fixes - 2 * half] - time[middle])
-    gap = reach > 3 * max(window, median(reach))
+    jumps = _jumps(time, north, east)
+    gap = (reach > 3 * max(window, median(reach))) | (jumps[2 * half :] > jumps[: fixes - 2 * half])
     turn[(speed < _SLOWEST) | gap | ~(bent < _VAGUE_TURN * speed)] = np.nan
     altitude = _altitude(recording, time[middle])
-    return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap)
+    where = time[1:][np.diff(jumps) > 0]
+    return Track(time[middle], north[middle], east[middle], speed, turn, altitude, gap, where)
+
+
+def _jumps(time: Floats, north: Floats, east: Floats) -> Ints:
+    """How many jumps there were up to each fix (n,): steps far longer than those two before and two behind."""
+    step, wait = np.hypot(np.diff(north), np.diff(east)), np.diff(time)
+    speed = np.pad(step / wait, 2, mode="edge")
+    usual = wait * np.maximum(speed[:-4], speed[4:])
+    scatter = median(np.abs(np.diff(step)))
+    return np.r_[0, np.cumsum(step > usual + _JUMP + _BEYOND * scatter)]
 
 
 def _altitude(recording: Recording, time: Floats) -> Floats:
