@@ -22,6 +22,7 @@ _PINT_NAMES = {
     "Grad": "degree",
     "kp": "kgf",
     "lbm": "lb",
+    "PS": "metric_horsepower",
 }
 MOMENTS = {
     "Nm": 1.0,

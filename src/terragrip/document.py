@@ -85,9 +85,10 @@ def read_yaml(path: str | os.PathLike[str]) -> Document:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         problem = getattr(error, "problem", None) or "cannot be read"
         place = None if mark is None else f"line {mark.line + 1}"
-        raise InputError(
-            f"not YAML: {problem}", file=file, place=place, hint="write it as 'key: value' lines"
-        ) from error
+        line = "" if mark is None else "".join(text.splitlines()[mark.line : mark.line + 1])
+        tabbed = line.lstrip(" ").startswith("\t")
+        hint = "indent by blanks, not by tabs" if tabbed else "write it as 'key: value' lines"
+        raise InputError(f"not YAML: {problem}", file=file, place=place, hint=hint) from error
     except InputError:
         raise
     except (RecursionError, ValueError, OverflowError) as error:  # too deep, or an impossible date
