@@ -111,6 +111,21 @@ def test_a_scale_of_units_is_no_radius() -> None:
     assert "check the units" in calibration.unknown[0].why
 
 
+@pytest.mark.parametrize("vehicle", [machine(), None])
+def test_exchanged_coordinates_turn_no_gyroscope(vehicle: tg.Vehicle | None) -> None:
+    """They move the positions half as far again, and their turns to the other side: 'sign: -1' was advised for the gyroscope."""
+    columns = field()
+    latitude, longitude = 50 + columns["latitude"], 10 + (columns["longitude"] - 11) / np.cos(np.radians(50))
+    assert (
+        unit_warnings(Recording.from_frame(columns | {"latitude": latitude, "longitude": longitude}), vehicle)
+        == []
+    )
+    (note,) = unit_warnings(
+        Recording.from_frame(columns | {"latitude": longitude, "longitude": latitude}), vehicle
+    )
+    assert note.endswith("that latitude and longitude are not exchanged.")
+
+
 def test_an_inverted_yaw_rate_is_noticed_everywhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -192,7 +192,9 @@ _EACH = (
     Check(
         "turn rate",
         lambda log: turn_rate_warnings(
-            log.rows, None if log.found("exchanged wheels") else log.any_vehicle, log.track
+            log.rows,
+            None if log.found("exchanged wheels") else log.any_vehicle,
+            None if log.found("positions") else log.track,
         ),
         _WAY,
         needs_wheels=False,

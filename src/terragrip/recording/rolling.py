@@ -40,6 +40,10 @@ _SLOWER = 0.1  # of the hub's speed: radii are known to that, or
 _RADII_SURE, _SLOWER_LEAST = 4.0, 0.04
 _SURE = 3.0  # standard errors of the receiver's noise: at 1 Hz a stretch has five of its samples
 _TURNING = 0.1  # of the hub's speed, that a length times the rate of turn comes to
+_ELSEWHERE = (
+    " The vehicle turns there: if ground_speed is measured ahead of its rear axle or beside its middle, write where ('antenna' in "
+    "the vehicle file)."
+)
 
 
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
@@ -167,28 +171,23 @@ def slower_warnings(
     if not found:
         return []
     first, last = max(found.values(), key=lambda stretch: stretch[1] - stretch[0])
-    what = (
-        "ground_speed, or all wheels' speeds, are"
-        if len(found) == len(vehicle.driven_radii)
-        else "their speeds are"
-    )
+    turning = turn is not None and _turns(vehicle, means, turn, (when >= first) & (when <= last))
+    if len(found) == len(vehicle.driven_radii):
+        what = "ground_speed, or all wheels' speeds, are"
+    else:
+        what = "their speeds, or the rate of turn, are" if turning else "their speeds are"
+    placed = vehicle.antenna is not None or vehicle.radar is not None
     return [
         f"{span(first, last).capitalize()} the rims of {', '.join(found)} go slower than their hubs by more than {slower:.0%} while they "
         f"pull, which no wheel that pulls does: {what} wrong there, and so is slip."
-        + ("" if turn is None else _by_a_turn(vehicle, means, turn, (when >= first) & (when <= last)))
+        + (_ELSEWHERE if turning and not placed else "")
     ]
 
 
-def _by_a_turn(vehicle: Vehicle, means: Means, turn: Floats, within: Bools) -> str:
-    """What else may explain rims that go slower than their hubs in windows (n,) of a turn: a ground speed measured elsewhere."""
+def _turns(vehicle: Vehicle, means: Means, turn: Floats, within: Bools) -> bool:
+    """Whether the vehicle turns in windows (n,), so that a ground speed measured elsewhere, or the turn, may explain slower rims."""
     length = max(vehicle.wheelbase or 0.0, vehicle.track or 0.0)
-    share = median(np.abs(means.of(turn) * length / means.speed)[within])
-    if vehicle.antenna is not None or vehicle.radar is not None or share < _TURNING:
-        return ""
-    return (
-        " The vehicle turns there: if ground_speed is measured ahead of its rear axle or beside its middle, write where ('antenna' in "
-        "the vehicle file)."
-    )
+    return median(np.abs(means.of(turn) * length / means.speed)[within]) >= _TURNING
 
 
 def _inner(recording: Recording, vehicle: Vehicle, means: Means) -> Floats:

@@ -69,8 +69,8 @@ def turn_rate_warnings(recording: Recording, vehicle: Vehicle | None, track: Tra
 
 def opposite_turn(against: list[str]) -> WrongSign:
     """The sentence on a rate of turn that all of ``against`` contradict."""
-    alone = against == ["the wheels' speeds"]
-    or_else = " If its sign is right, left and right wheels are exchanged." if alone else ""
+    exchanged = {"the wheels' speeds": "left and right wheels", "the positions": "latitude and longitude"}
+    or_else = "" if len(against) > 1 else f" If its sign is right, {exchanged[against[0]]} are exchanged."
     turn = f"{' and '.join(against)} turn the other way"
     return WrongSign(
         f"angular_velocity_z is of the wrong sign: {turn}. Left is positive: write 'sign: -1' for it in the profile.{or_else}",
