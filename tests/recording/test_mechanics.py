@@ -192,6 +192,21 @@ def test_a_pull_that_cannot_be_is_named(factors: dict[str, float], expected: str
         assert bool(notes) == bool(expected)
 
 
+def test_a_gyroscope_of_the_wrong_sign_is_named_alone() -> None:
+    """In turns of 12 s the hubs were on the wrong side of the rims, and ground speed or the wheels' speeds were called wrong."""
+    columns = without(drive(), "acceleration_y", "roll")
+    time = columns["time"]
+    yaw = np.where(time % 40 < 12, 0.25, 0.0) * np.where(time % 80 < 40, 1, -1)
+    for k, wheel in enumerate(WHEELS):
+        columns[f"wheel_speed_{wheel}"] += (
+            (0.55 if k % 2 else -0.55) * (yaw - 0.2 * np.sin(time / 11)) / RADIUS
+        )
+    turned = columns | {
+        "angular_velocity_z": -yaw + 0.01 * np.random.default_rng(2).standard_normal(len(time))
+    }
+    assert notes_on(turned).startswith("angular_velocity_z is of the wrong sign")
+
+
 def test_a_cell_with_nothing_towed_is_not_in_kilonewtons() -> None:
     """A cell's noise of .4 % of the weight comes to less than a thousandth in the mean over a second: 'unit: kN' was advised."""
     columns = drive()

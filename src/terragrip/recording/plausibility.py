@@ -173,7 +173,7 @@ _EACH = (
     Check(
         "slower",
         lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
-        (*_SPEEDS, "signs", "motion", "acceleration", "frozen", "dropouts"),
+        (*_SPEEDS, "exchanged wheels", "turn rate", "signs", "motion", "acceleration", "frozen", "dropouts"),
     ),
     Check("rescaled", lambda log: rescaled_warnings(log.as_measured, log.vehicle, log.turn, log.track), _WAY),
     Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
