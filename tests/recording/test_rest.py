@@ -7,7 +7,7 @@ import pytest
 
 from steady_drive import TIME, log
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.rest import rest_warnings, torque_rest_warnings
+from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_rest_warnings
 from terragrip.vehicle import Vehicle
 
 STOPS = (np.abs(TIME - 60) < 8) | (np.abs(TIME - 140) < 6)
@@ -37,6 +37,20 @@ def test_a_right_zero_noise_without_a_sign_and_creeping_are_left_alone() -> None
     assert rest_warnings(stopping(0.0, np.where(STOPS, receiver, 0.0))) == []
     creep = np.where(np.abs(TIME - 60) < 8, 0.2, 0.0)  # in one stop of three: it slid
     assert rest_warnings(stopping(0.0, creep)) == []
+
+
+@pytest.mark.parametrize("zero", [0.03, -0.03, 0.002])
+def test_a_gyroscope_whose_zero_is_off_is_named_with_its_size(zero: float) -> None:
+    """Hubs seemed to differ by .03 of the speed: slip .015 off on both sides, without a word; of small machines' .02 rad/s came to .024."""
+    axles = {"rear": {"mass": 2000, "wheels": ["l", "r"]}}
+    vehicle = Vehicle.from_dict(
+        {"mass": 2000, "track": 1.6, "axles": axles, "wheel": {"radius": 0.4, "inertia": 10}}
+    )
+    log = stopping()
+    turn = zero + 0.02 * np.random.default_rng(6).standard_normal(len(TIME))
+    found = turn_rest_warnings(Recording(TIME, log.channels | {"angular_velocity_z": turn}), vehicle)
+    named = [float(note.split(" reads ")[1].split()[0]) for note in found]
+    assert named == ([pytest.approx(zero, abs=0.002)] if abs(zero) > 0.01 else [])
 
 
 def test_wheels_that_read_0_throughout_show_no_stop() -> None:

@@ -35,7 +35,7 @@ from terragrip.recording.plain_units import (
     spacing_warnings,
 )
 from terragrip.recording.rescaled import rescaled_warnings
-from terragrip.recording.rest import rest_warnings, torque_rest_warnings
+from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
@@ -173,7 +173,17 @@ _EACH = (
     Check(
         "slower",
         lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
-        (*_SPEEDS, "exchanged wheels", "turn rate", "signs", "motion", "acceleration", "frozen", "dropouts"),
+        (
+            *_SPEEDS,
+            "exchanged wheels",
+            "turn rate",
+            "turn rate at rest",
+            "signs",
+            "motion",
+            "acceleration",
+            "frozen",
+            "dropouts",
+        ),
     ),
     Check("rescaled", lambda log: rescaled_warnings(log.as_measured, log.vehicle, log.turn, log.track), _WAY),
     Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
@@ -245,6 +255,11 @@ _EACH = (
     Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
     Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
+    Check(
+        "turn rate at rest",
+        lambda log: turn_rest_warnings(log.rows, log.vehicle),
+        (*_WAY, "frozen", "turn rate"),
+    ),
     Check("torques at rest", lambda log: torque_rest_warnings(log.rows, log.vehicle), (*_WAY, "frozen")),
     Check("mass", lambda log: mass_warnings(log.rows, log.any_vehicle), needs_wheels=False),
     Check("codes", lambda log: log.codes, needs_wheels=False),

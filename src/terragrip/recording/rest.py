@@ -1,4 +1,4 @@
-"""A ground speed, or torques, that are not 0 where the vehicle stands: sentences for the user, never errors."""
+"""A ground speed, a rate of turn or torques that are not 0 where the vehicle stands: sentences for the user, never errors."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ _FEWEST = 4  # values of a stop
 _SHIFT = 0.03  # of the usual speed, which slip is off by
 _SURE = 4.0  # standard deviations at rest: noise without a sign has a mean of 1.9 of its own (Rayleigh)
 _ALIKE = 0.5  # of the shift, by which stops differ
+_TURNED = 0.005  # of the usual speed, which the hubs of both sides seem to be off by
 _HELD = 0.1  # of a torque, likewise: motors hold a vehicle, or each other, on one slope and another
 _STOPS = 3  # two agree by chance (2 notes on the few of 96 right drives that had two)
 _THRUST = 0.01  # of the weight
@@ -37,23 +38,37 @@ def rest_warnings(recording: Recording) -> list[str]:
     if ground is None or not np.isfinite(ground).any():
         return []
     rows, still = _stops(recording)
-    read = [values for stop in rows if len(values := _known(ground[stop])) >= _FEWEST]
+    read = _read(ground, rows)
     if not read:
         return []
-    means, scatter = (
-        np.array([np.mean(values) for values in read]),
-        [float(np.std(values)) for values in read],
-    )
-    shift = median(means)
-    driven = np.abs(ground[~still & np.isfinite(ground)])
-    usual = quantile(driven, 0.95) if len(driven) else 0.0
-    if not usual > 0 or not abs(shift) > max(_SHIFT * usual, _SURE * median(np.array(scatter))):
-        return []
-    if quantile(np.abs(means - shift), 0.75) > _ALIKE * abs(shift):
+    shift = _alike(read)
+    usual = _usual(ground, still)
+    scatter = median(np.array([float(np.std(values)) for values in read]))
+    if not usual > 0 or not abs(shift) > max(_SHIFT * usual, _SURE * scatter):
         return []
     return [
         f"ground_speed reads {shift:.2g} m/s in {len(read)} stop{'s' if len(read) > 1 else ''} of all wheels: its zero is off, and slip "
         f"at usual speed by {abs(shift) / usual:.2g}, unless the vehicle slid. Write 'offset:' for it in the profile."
+    ]
+
+
+def turn_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence where the gyroscope reads much the same rate of turn, not 0, whenever all wheels stand for long."""
+    yaw, ground = (recording.channels.get(name) for name in ("angular_velocity_z", "ground_speed"))
+    if yaw is None or ground is None or vehicle.track is None:
+        return []
+    rows, still = _stops(recording)
+    read = _read(yaw, rows)
+    if not read:
+        return []
+    shift, usual = _alike(read), _usual(ground, still)
+    error = median(np.array([float(np.std(values)) / np.sqrt(len(values)) for values in read]))
+    off = abs(shift) * float(np.max(np.abs(vehicle.wheel_side)))
+    if not usual > 0 or not off > _TURNED * usual or not abs(shift) > _SURE * error:
+        return []
+    return [
+        f"angular_velocity_z reads {shift:.2g} rad/s in {len(read)} stop{'s' if len(read) > 1 else ''} of all wheels: its zero is off, and "
+        f"the slips of both sides at usual speed by {off / usual:.2g}. Write 'offset:' for it in the profile."
     ]
 
 
@@ -99,6 +114,24 @@ def _is_off(thrusts: Floats, least: float) -> bool:
     """Whether thrusts over the weight (stops,) are much the same, and not 0."""
     usual = median(thrusts)
     return abs(usual) > least and float(np.max(np.abs(thrusts - usual))) <= _HELD * abs(usual)
+
+
+def _read(values: Floats, stops: list[slice]) -> list[Floats]:
+    """What a channel (n,) reads in each stop that has enough of it."""
+    return [known for stop in stops if len(known := _known(values[stop])) >= _FEWEST]
+
+
+def _alike(read: list[Floats]) -> float:
+    """The usual mean of what is read in stops, 0 where they differ by half of it."""
+    means = np.array([np.mean(values) for values in read])
+    shift = median(means)
+    return shift if quantile(np.abs(means - shift), 0.75) <= _ALIKE * abs(shift) else 0.0
+
+
+def _usual(ground: Floats, still: Bools) -> float:
+    """The speed (n,) that a twentieth of the driving exceeds."""
+    driven = np.abs(ground[~still & np.isfinite(ground)])
+    return quantile(driven, 0.95) if len(driven) else 0.0
 
 
 def _known(values: Floats) -> Floats:
