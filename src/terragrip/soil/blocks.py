@@ -34,6 +34,7 @@ FLOOR = 1e-4
 _LONGEST_SKIP = 4
 """Periods (2 s) without a row that do not end a streak: logs of 1 Hz have none in every second period. A gap is an event of its own."""
 _USABLE = ("", "immobilization", "outlier")
+_AGAIN = "write the estimates again with 'terragrip estimate'"
 
 
 @dataclass(frozen=True)
@@ -118,14 +119,55 @@ def blocks_of(
     `before`: number and streak of the block before, when a drive continues. InputError where a column, a distance or every row is missing.
     """
     wheels = tuple(axle_of)
+    time, distance = _checked(columns, wheels, file)
+    first = float(time[0]) if origin is None else origin
+    count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
+    begin = np.flatnonzero(np.concatenate(([True], count[1:] != count[:-1])))
+    size = np.diff(np.append(begin, time.size))
+
+    slip, adhesion = _matrix(columns, "slip_{}", wheels), _matrix(columns, "adhesion_{}", wheels)
+    resistance = np.asarray(columns["soil_resistance"], dtype=float)[:, None]
+    good = np.isin(np.asarray(columns["event"], dtype=object), _USABLE)
+    good &= np.isfinite(slip).all(axis=1) & (np.abs(slip) <= LARGEST_SLIP).all(axis=1)
+    good &= np.isfinite(adhesion).all(axis=1) & np.isfinite(resistance[:, 0])
+    rows = _Rows(good, begin, size, np.add.reduceat(good.astype(np.int64), begin))
+
+    def column(name: str, absent: float) -> Floats:
+        return np.asarray(columns.get(name, np.full(time.size, absent)), dtype=float)
+
+    def variance(*names: str) -> Floats:
+        return rows.mean(np.column_stack([column(name, 0.0) for name in names]) ** 2)
+
+    load = rows.mean(np.column_stack(list(wheel_loads(columns, axle_of).values())))
+    load = np.where(np.isfinite(load) & (load > 0), load, 1.0)
+    level, mu, level_of_slip = rows.mean(resistance), rows.mean(adhesion), rows.mean(slip)
+    within = rows.spread(resistance, level)[:, 0], rows.spread(adhesion, mu).mean(axis=1)
+    return Blocks(
+        number=count[begin],
+        start=time[begin],
+        end=np.append(time[begin[1:]], time[-1]),
+        rows=size,
+        usable=rows.usable,
+        streak=_streak(count[begin], 2 * rows.usable >= size, before),
+        travelled=distance[begin + size - 1],
+        resistance=level[:, 0],
+        resistance_variance=variance("soil_resistance_std")[:, 0],
+        adhesion=mu,
+        adhesion_variance=variance(*(f"adhesion_{w}_std" for w in wheels)),
+        roughness=np.log(np.column_stack(within) + FLOOR),
+        curve_a=rows.mean(column("curve_a", np.nan)[:, None])[:, 0],
+        slip=level_of_slip,
+        slip_sd=np.log(rows.spread(slip, level_of_slip).mean(axis=1) + FLOOR),
+        slip_variance=variance(*(f"slip_{w}_std" for w in wheels)),
+        share=load / load.sum(axis=1, keepdims=True),
+    )
+
+
+def _checked(columns: Mapping[str, Any], wheels: Sequence[str], file: str | None) -> tuple[Floats, Floats]:
+    """Time and distance (rows,) of columns that are all there."""
     for name in needed_columns(wheels):
         if name not in columns:
-            raise InputError(
-                "is missing",
-                file=file,
-                place=f"column {name}",
-                hint="write the estimates again with 'terragrip estimate'",
-            )
+            raise InputError("is missing", file=file, place=f"column {name}", hint=_AGAIN)
     time = np.asarray(columns["time"], dtype=float)
     if not time.size:
         raise InputError("holds no row", file=file, hint="estimate a log that is not empty")
@@ -133,65 +175,31 @@ def blocks_of(
     if not np.isfinite(distance).all():
         row = int(np.argmin(np.isfinite(distance)))
         raise InputError(
-            f"{distance[row]} is no distance",
-            file=file,
-            place=f"column distance, row {row}",
-            hint="write the estimates again with 'terragrip estimate'",
+            f"{distance[row]} is no distance", file=file, place=f"column distance, row {row}", hint=_AGAIN
         )
-    first = float(time[0]) if origin is None else origin
-    count = np.floor((time - first) / PERIOD + 1e-9).astype(np.int64)
-    begin = np.flatnonzero(np.concatenate(([True], count[1:] != count[:-1])))
-    size = np.diff(np.append(begin, time.size))
+    return time, distance
 
-    slip = _matrix(columns, "slip_{}", wheels)
-    good = np.isin(np.asarray(columns["event"], dtype=object), _USABLE)
-    good &= np.isfinite(slip).all(axis=1) & (np.abs(slip) <= LARGEST_SLIP).all(axis=1)
-    adhesion = _matrix(columns, "adhesion_{}", wheels)
-    resistance = np.asarray(columns["soil_resistance"], dtype=float)[:, None]
-    good &= np.isfinite(adhesion).all(axis=1) & np.isfinite(resistance[:, 0])
-    usable = np.add.reduceat(good.astype(np.int64), begin)
 
-    def variance(*names: str) -> Floats:
-        return mean(
-            np.column_stack([np.asarray(columns.get(n, np.zeros(time.size)), dtype=float) for n in names])
-            ** 2
-        )
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of a drive, cut where each block begins; `usable` of the `size` rows of a block are `good`."""
 
-    def mean(values: Floats) -> Floats:
-        total = np.add.reduceat(np.where(good[:, None], values, 0.0), begin, axis=0)
-        return np.asarray(np.where(usable[:, None] > 0, total / np.maximum(usable, 1)[:, None], np.nan))
+    good: Bools
+    begin: NDArray[np.int64]
+    size: NDArray[np.int64]
+    usable: NDArray[np.int64]
 
-    def spread(values: Floats, level: Floats) -> Floats:
-        off = np.where(good[:, None], values - np.repeat(level, size, axis=0), 0.0)
-        square = np.add.reduceat(off**2, begin, axis=0) / np.maximum(usable - 1, 1)[:, None]
-        return np.asarray(np.where(usable[:, None] >= LEAST_ROWS, np.sqrt(square), np.nan))
+    def mean(self, values: Floats) -> Floats:
+        """Of the good rows (rows, n), by block (blocks, n); NaN where there is none."""
+        total = np.add.reduceat(np.where(self.good[:, None], values, 0.0), self.begin, axis=0)
+        usable = self.usable[:, None]
+        return np.asarray(np.where(usable > 0, total / np.maximum(usable, 1), np.nan))
 
-    loads = wheel_loads(columns, axle_of)
-    load = mean(np.column_stack([loads[w] for w in wheels]))
-    load = np.where(np.isfinite(load) & (load > 0), load, 1.0)
-    level, mu, level_of_slip = mean(resistance), mean(adhesion), mean(slip)
-    within = spread(resistance, level)[:, 0], spread(adhesion, mu).mean(axis=1)
-    return Blocks(
-        number=count[begin],
-        start=time[begin],
-        end=np.append(time[begin[1:]], time[-1]),
-        rows=size,
-        usable=usable,
-        streak=_streak(count[begin], 2 * usable >= size, before),
-        travelled=distance[begin + size - 1],
-        resistance=level[:, 0],
-        resistance_variance=variance("soil_resistance_std")[:, 0],
-        adhesion=mu,
-        adhesion_variance=variance(*(f"adhesion_{w}_std" for w in wheels)),
-        roughness=np.log(np.column_stack(within) + FLOOR),
-        curve_a=mean(np.asarray(columns.get("curve_a", np.full(time.size, np.nan)), dtype=float)[:, None])[
-            :, 0
-        ],
-        slip=level_of_slip,
-        slip_sd=np.log(spread(slip, level_of_slip).mean(axis=1) + FLOOR),
-        slip_variance=variance(*(f"slip_{w}_std" for w in wheels)),
-        share=load / load.sum(axis=1, keepdims=True),
-    )
+    def spread(self, values: Floats, level: Floats) -> Floats:
+        """SD of the good rows (rows, n) about the `level` of their block (blocks, n); NaN where they are few."""
+        off = np.where(self.good[:, None], values - np.repeat(level, self.size, axis=0), 0.0)
+        square = np.add.reduceat(off**2, self.begin, axis=0) / np.maximum(self.usable - 1, 1)[:, None]
+        return np.asarray(np.where(self.usable[:, None] >= LEAST_ROWS, np.sqrt(square), np.nan))
 
 
 def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
