@@ -640,3 +640,21 @@ def test_motors_in_a_list_that_no_name_tells_apart_are_named() -> None:
     (sentence,) = (s for s in said if "is not known" in s)
     assert "/motors/status.motors[].rpm is not known" in sentence
     assert 'wheel_speed_fl: {from: "/motors/status.motors[0].rpm"}' in sentence
+
+
+def test_channels_of_two_robots_in_one_bag_are_not_mixed() -> None:
+    """The wheels of one were proposed with the ground speed of the other, without a doubt."""
+    columns = {
+        f"/{robot}/joint_states.velocity.front_{side}": 5 * SPEED
+        for robot in ("alpha", "beta")
+        for side in ("left", "right")
+    }
+    columns["/beta/gps/vel.twist.linear.x"] = 0.9 * SPEED
+    proposals = _propose(columns)
+    assert {proposal.columns[0][:6] for proposal in proposals.values()} == {"/alpha"}
+    assert any(
+        "several machines, /alpha, /beta, of which /alpha is read" in sentence
+        for sentence in proposals.left_out
+    )
+    columns["/alpha/gps/vel.twist.linear.x"] = SPEED
+    assert _propose(columns)["ground_speed"].columns[0].startswith("/alpha")

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.errors import InputError, nearest
+from terragrip.formats.machines import of_one_machine
 from terragrip.formats.profile_parts import MADE_OF, Source, TimeSource, matching
 from terragrip.formats.table import LogTable
 from terragrip.recording.checks import how_to_pivot
-from terragrip.recording.schema import TIME
+from terragrip.recording.schema import TIME, rim_names
 from terragrip.units import UnitError, factor_to
 
 if TYPE_CHECKING:
@@ -88,36 +89,15 @@ def _of_other_axes(speed: Source | None, log: LogTable) -> list[str]:
 
 
 def _of_one_machine(profile: Profile, log: LogTable) -> tuple[LogTable, list[str]]:
-    """The log with the columns beside its wheels' first (``/r1`` of ``/r1/joint_states``), and a sentence on other machines in it.
-
-    Namespaces in which each wheel speed is found are machines: no pattern ``*...`` may take from another what the first one lacks.
-    """
+    """The log for patterns ``*...``, which may take nothing of a second machine, and a sentence on that (`of_one_machine`)."""
     names = {
         key: [n for one in source.chain for n in one.columns] for key, source in profile.channels.items()
     }
     found = {key: [c for n in own for c in matching(n, log.columns)] for key, own in names.items()}
-    speeds = [
-        list(map(_namespace, found[key])) for key in found if key.startswith("wheel_") and "speed" in key
-    ]
-    home, *others = dict.fromkeys(n for n in (speeds or [[]])[0] if all(n in own for own in speeds)) or [""]
-    if not home:
-        return log, []
-    stated = {
-        c for own in names.values() for n in own if not n.startswith("*") for c in matching(n, log.columns)
-    }
-    kept = [c for c in log.columns if c in stated or _namespace(c) not in others]
-    kept.sort(key=lambda c: _namespace(c) != home)
-    sentence = (
-        f"The log has several machines, {', '.join((home, *others))}, of which {home} is read; "
-        "for another one name its columns in a profile."
-    )
-    return replace(log, columns={c: log.columns[c] for c in kept}), [sentence] if others else []
-
-
-def _namespace(column: str) -> str:
-    """``/r1`` of ``/r1/joint_states.velocity.fl``; empty without one."""
-    parts = column.partition(".")[0].split("/")
-    return f"/{parts[1]}" if len(parts) > 2 and not parts[0] else ""
+    kept, notes = of_one_machine(log.columns, [found[key] for key in rim_names(found)])
+    stated = [n for own in names.values() for n in own if not n.startswith("*")]
+    kept += [c for n in stated for c in matching(n, log.columns) if c not in kept]
+    return replace(log, columns={c: log.columns[c] for c in kept}), notes
 
 
 def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:

@@ -20,10 +20,11 @@ from terragrip.formats.channel_proposal import Proposal, proposal_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.indirect import add_indirect, varies, velocity_in_the_plane
 from terragrip.formats.judgement import Guess, Judge
+from terragrip.formats.machines import of_one_machine, twins
 from terragrip.formats.rim_units import own_name
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.checks import PLACES
-from terragrip.recording.schema import LABELS, split_channel
+from terragrip.recording.schema import LABELS, rim_names, split_channel
 from terragrip.vehicle import Vehicle
 
 Texts = Mapping[str, npt.NDArray[Any]]
@@ -49,8 +50,28 @@ def propose(
     """A `Proposal` for each channel that some column may be, by channel.
 
     ``numbers`` are the columns (n,), ``texts`` the text columns, ``units`` those that the log states, ``clocks`` the instants [s] of
-    each column (n,), without which nothing is held against time. The radii of a ``vehicle`` tell the unit of wheel speeds.
+    each column (n,), without which nothing is held against time. The radii of a ``vehicle`` tell the unit of wheel speeds. Of several
+    machines (`of_one_machine`) the first is proposed.
     """
+    result = _proposed(numbers, texts, units, clocks, vocabulary, vehicle)
+    speeds = [result[channel].columns[0] for channel in rim_names(result)]
+    own, sentences = of_one_machine(numbers, [twins(column, numbers) for column in speeds])
+    if own == list(numbers):
+        return result
+    result = _proposed({name: numbers[name] for name in own}, texts, units, clocks, vocabulary, vehicle)
+    result.left_out += tuple(sentences)
+    return result
+
+
+def _proposed(
+    numbers: Mapping[str, Floats],
+    texts: Texts | tuple[str, ...],
+    units: Mapping[str, str],
+    clocks: Mapping[str, Floats] | None,
+    vocabulary: Vocabulary,
+    vehicle: Vehicle | None,
+) -> Proposals:
+    """The proposals of all columns, whichever machine they are of."""
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
     columns = {
         name: of_the_only_wheel(column, vehicle)
