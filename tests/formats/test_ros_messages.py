@@ -21,7 +21,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from terragrip.errors import InputError
-from terragrip.formats.messages import Topic
+from terragrip.formats.messages import Topic, log_of
 from terragrip.formats.reading import read_table
 from terragrip.formats.ros_types import Types
 from test_logs import COUNT, fill, write_ros1, write_ros2
@@ -284,3 +284,16 @@ def test_messages_that_a_killed_recorder_left_beside_the_bag(tmp_path: Path) -> 
         base.commit()
         shutil.copytree(file.parent, killed)
     assert len(read_table(killed).columns["time"]) == COUNT
+
+
+def test_joints_of_two_publishers_on_one_topic_keep_their_values() -> None:
+    """A message without a joint, at the instant of one that has it, took its value away: 'it was sent as "not available" throughout'."""
+    topic = Topic("/joint_states")
+    for second in range(1, 4):
+        for joint, value in (("fl", float(second)), ("rl", 2.0), ("tool", "mower")):
+            topic.push(second, b"", lambda _, joint=joint, value=value: (None, {joint: value}))  # type: ignore[misc]
+    table = log_of([topic], "bag", []).table()
+    assert table.columns["fl"].tolist() == [1, 2, 3]
+    assert table.columns["rl"].tolist() == [2, 2, 2]
+    assert table.columns["tool"].tolist() == ["mower"] * 3
+    assert not any("replace" in note for note in table.notes)

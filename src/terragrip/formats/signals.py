@@ -79,7 +79,7 @@ class SignalLog:
         """One table on the union of the instants, NaN where a signal was not measured; texts last until the next.
 
         Time counts from the first instant; the table's ``start`` says when that was, where stamps count from 1970.
-        Stamps that are no finite number are left out and counted; of two samples at one instant the later one counts.
+        Stamps that are no finite number are left out and counted; of two values at one instant the later one counts.
         ``release`` takes the signals out of this log one by one as they are spread, so that a long log does not stand in
         memory twice. Raises InputError if no signal that was asked for has a sample.
         """
@@ -140,11 +140,13 @@ def _replaces(values: npt.NDArray[Any], rows: npt.NDArray[np.int32]) -> npt.NDAr
     again = rows[1:] == rows[:-1]
     if not again.any():
         return np.asarray(again)
-    before, after = values[:-1], values[1:]
-    alike = (after == before) | (
-        (after != after) & (before != before)
-    )  # NaN is unlike itself, among texts too
-    return np.asarray(again & ~alike.astype(np.bool_))
+    known = _known(values)
+    return np.asarray(again & known[1:] & known[:-1] & (values[1:] != values[:-1]).astype(np.bool_))
+
+
+def _known(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Where values (n,) are measured: no NaN, or no None among texts."""
+    return np.asarray(values == values if values.dtype.kind != "O" else values != None)  # noqa: E711  (elementwise)
 
 
 def _other_time(name: str) -> str:
@@ -194,8 +196,12 @@ def _tolerance(clocks: list[Floats]) -> float:
 
 
 def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:
+    apart = bool((rows[1:] > rows[:-1]).all())
+    if not apart:  # a message without the value, at the instant of one that has it, takes nothing away
+        known = _known(values)
+        values, rows = values[known], rows[known]
     if values.dtype.kind in "fiub":
-        if values.dtype == np.float64 and len(rows) == length and (rows[1:] > rows[:-1]).all():
+        if values.dtype == np.float64 and apart and len(rows) == length:
             return values  # measured at every instant
         result = np.full(length, np.nan)
         result[rows] = values
