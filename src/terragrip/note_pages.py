@@ -89,6 +89,7 @@ PAGES = (
     (", and was left out", "formats#damaged-files-and-large-ones"),
     ("what that part of the bag holds", "formats#ros-bags-and-mcap"),
     ("may be one component of a velocity", "checks#units-scales-and-zeros"),
+    ("is mixed; cut the log there", "formats#ros-bags-and-mcap"),
     ("The log has several machines", "formats#ros-bags-and-mcap"),
     ("cannot be read and were left out", "formats#damaged-files-and-large-ones"),
     ("No soil of the library fits", "ground#limits"),

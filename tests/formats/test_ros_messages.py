@@ -297,3 +297,12 @@ def test_joints_of_two_publishers_on_one_topic_keep_their_values() -> None:
     assert table.columns["rl"].tolist() == [2, 2, 2]
     assert table.columns["tool"].tolist() == ["mower"] * 3
     assert not any("replace" in note for note in table.notes)
+
+
+def test_a_recorders_clock_that_is_set_back_is_named() -> None:
+    """Three seconds of a drive were mixed with the three before, without a word where no two stamps were equal."""
+    topic = Topic("/odom")
+    for k in range(100):
+        topic.push(k * 0.1 - 3.02 * (k > 50), b"", lambda _: (None, {"/odom.v": 1.0}))
+    (note,) = log_of([topic], "bag", []).table().notes
+    assert note.startswith("The clock goes back by 2.92 s, 5 s after the start: ")

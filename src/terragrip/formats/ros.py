@@ -72,11 +72,11 @@ def read_ros2(path: str, wanted: Wanted, databases: Databases) -> SignalLog:
 
 
 def _files_of(path: str) -> tuple[list[Path], list[str]]:
-    """The files of a bag that is a folder or one file, in the order of their names, and sentences on those that are not there."""
+    """The files of a bag that is a folder or one file, in the order of their numbers, and sentences on those that are not there."""
     folder = Path(path)
     if folder.is_file():
         return [folder], []
-    inside = sorted(folder.iterdir())
+    inside = sorted(folder.iterdir(), key=lambda p: [(len(n), n) for n in re.split(r"(\d+)", p.name)])
     files = [p for p in inside if p.suffix == ".db3"] or [p for p in inside if p.suffix == ".mcap"]
     packed = [p.name for p in inside if p.suffix in (".zstd", ".zst")]
     if not files:

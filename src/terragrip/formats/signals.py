@@ -17,6 +17,7 @@ from terragrip.recording.schema import TIME
 
 SAME = 1e-3
 """Share of the shortest typical spacing within which two stamps are one instant."""
+_STEP = 1.0  # s by which a clock that was set goes back: samples that came late are no such step
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +104,13 @@ class SignalLog:
                 )
             return LogTable((TIME, *self.names), {}, {}, self.source, self.sha256, tuple(notes), clocked=True)
         place = dict(zip(orders, rows, strict=True))
+        disordered = [clocks[key] for key, order in orders.items() if not isinstance(order, slice)]
+        back, at = max(map(_set_back, disordered), default=(0.0, 0.0))
+        if back > _STEP:
+            notes.append(
+                f"The clock goes back by {back:.4g} s, {at - base[0]:.4g} s after the start: what was measured before and after "
+                "that is mixed; cut the log there."
+            )
         start = float(base[0]) if base[0] > SINCE_1970 else None
         base -= base[0]
         replaced = {key: np.zeros(max(len(row) - 1, 0), dtype=np.bool_) for key, row in place.items()}
@@ -156,6 +164,15 @@ def _other_time(name: str) -> str:
 def _clock_set_at(time: Floats) -> float:
     """The least stamp that counts: of a clock (n,) most of which counts from 1970, earlier ones are from before it was set."""
     return SINCE_1970 if 2 * np.count_nonzero(time > SINCE_1970) > len(time) else -np.inf
+
+
+def _set_back(time: Floats) -> tuple[float, float]:
+    """By how much [s] a clock (n,) goes back at most from one sample to the next, and the stamp before that."""
+    known = time[np.isfinite(time) & (time >= _clock_set_at(time))]
+    row = int(np.argmin(np.diff(known))) if len(known) > 1 else 0
+    return float(known[row] - known[row + 1] if len(known) > 1 else 0.0), float(
+        known[row] if len(known) else 0.0
+    )
 
 
 def _order(time: Floats) -> Ints | slice:
