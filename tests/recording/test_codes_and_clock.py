@@ -279,7 +279,7 @@ def test_clock_times_are_those_of_the_calendar_in_utc() -> None:
 @pytest.mark.parametrize(
     ("time", "why"),
     [
-        (np.floor(np.arange(20) / 2), "rounded, or stored with too few digits"),
+        (np.floor(np.arange(20) / 2), "rounded, stored with too few digits, or of several machines"),
         (np.r_[0:10, 9:20], "keep one row per instant"),
     ],
 )

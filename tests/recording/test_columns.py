@@ -136,3 +136,10 @@ def test_an_index_named_time_is_the_time_and_no_other_is() -> None:
     for name, columns in (("time", ["time", "a"]), ("row", ["a"]), ("zone", ["a"])):
         frame = pd.DataFrame({"a": [1.0, 2.0]}, index=pd.Index([0.0, 0.5], name=name))
         assert list(columns_of(frame, None)) == columns
+
+
+def test_a_level_of_an_index_named_time_is_the_time() -> None:
+    """'column time: is missing', of a table set_index(['machine', 'time'])."""
+    frame = pd.DataFrame({"machine": ["a", "a"], "time": [0.0, 0.5], "ground_speed": [1.0, 2.0]})
+    columns = columns_of(frame.set_index(["machine", "time"]), None)
+    assert columns["time"].tolist() == [0.0, 0.5]

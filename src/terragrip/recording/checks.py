@@ -213,8 +213,9 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     last = before if row == 0 else time[row - 1]
     again = float(np.mean(np.diff(time) == 0))
     if time[row] == last and again > _ROUNDED:
-        problem = f"time repeats, as {again:.0%} of the stamps here do: they are rounded, or stored with too few digits"
-        hint = "write time with more digits"
+        why = "they are rounded, stored with too few digits, or of several machines"
+        problem = f"time repeats, as {again:.0%} of the stamps here do: {why}"
+        hint = "write time with more digits, or give each machine a table of its own"
     elif time[row] == last:
         problem, hint = "time repeats", "keep one row per instant"
     else:

@@ -27,12 +27,10 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
         pairs = list(frame.items())
     elif package == "pandas" and hasattr(frame, "columns"):
         index = frame.index
-        if (
-            TIME not in frame.columns
-            and index.nlevels == 1
-            and (index.name == TIME or index.dtype.kind in "mM")
-        ):
-            frame = frame.rename_axis(TIME).reset_index()
+        if TIME not in frame.columns and index.nlevels == 1 and index.dtype.kind in "mM":
+            frame = frame.rename_axis(TIME)
+        if TIME not in frame.columns and TIME in frame.index.names:
+            frame = frame.reset_index(level=TIME)
         pairs = [(name, _from_pandas(series)) for name, series in frame.items()]
     elif package == "polars" and hasattr(frame, "get_columns"):
         pairs = [(series.name, series.to_numpy()) for series in frame.get_columns()]
