@@ -175,6 +175,14 @@ def test_refusal(columns: Columns, change: Callable[[Columns], Any], message: st
         ),
         (_without("wheel_speed_rr"), "column wheel_speed_rr: is missing; the log has wheel speeds for fl, fr, rl"),
         (_without("drive_torque_rr"), "column drive_torque_rr: is missing, but the wheel rr is driven"),
+        (
+            lambda c: {k.replace("wheel_speed_rr", "wheel_sped_rr"): v for k, v in c.items()},
+            "column wheel_speed_rr: is missing; the nearest column is 'wheel_sped_rr'",
+        ),
+        (
+            lambda c: {k.replace("torque_rr", "torqe_rr"): v for k, v in c.items()},
+            "column drive_torque_rr: is missing, but the wheel rr is driven; the nearest column is 'drive_torqe_rr'",
+        ),
         (lambda c: {**c, "vertical_load_middle": c["time"]}, "column vertical_load_middle: the vehicle has no axle middle"),
     ],
 )  # fmt: skip

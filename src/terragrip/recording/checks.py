@@ -124,6 +124,7 @@ def how_to_pivot(columns: Collection[str]) -> str | None:
     )
 
 
+UNUSED = "Columns that are not used: "
 NOTHING_TOWED = (
     "There is no drawbar_force: the vehicle is assumed to tow nothing. If it does, soil_resistance contains the pull, and net traction and "
     "efficiency are too small: write how large the pull may be as 'uncertainty: {drawbar_force: 3 kN}' in the vehicle file, or 0 if "
@@ -138,7 +139,7 @@ def remarks(columns: Collection[str]) -> list[str]:
     unused = [c for c in columns if c not in known and not is_channel(c)]
     if unused:
         more = f" and {len(unused) - 8} more" if len(unused) > 8 else ""
-        notes.append(f"Columns that are not used: {', '.join(unused[:8])}{more}.")
+        notes.append(f"{UNUSED}{', '.join(unused[:8])}{more}.")
     if "drawbar_force" not in columns:
         notes.append(NOTHING_TOWED)
     return notes

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.errors import InputError, suggestion
+from terragrip.errors import InputError, nearest, suggestion
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
 from terragrip.recording.columns import columns_of, numbers, seconds, stamps_of, start_of, texts
@@ -216,15 +216,22 @@ class Recording:
                 fix = (
                     "name them alike" if driven else "map the ground speed over the radius of this free wheel"
                 )
-                page = "vehicle#signals-that-are-missing"
-                raise self._unfit(f"wheel_speed_{wheel}", "is missing", f"{evidence}; {fix}", page)
+                raise self._missing(f"wheel_speed_{wheel}", "is missing", f"{evidence}; {fix}")
             if driven and f"drive_torque_{wheel}" not in self.channels:
                 hint = "add it, or say 'driven: false' in the vehicle file if its axle has no drive"
-                problem = f"is missing, but the wheel {wheel} is driven"
-                raise self._unfit(f"drive_torque_{wheel}", problem, hint, "vehicle#signals-that-are-missing")
+                raise self._missing(
+                    f"drive_torque_{wheel}", f"is missing, but the wheel {wheel} is driven", hint
+                )
         for force in ("drawbar_force", "hitch_load"):
             checks.require_hitch(vehicle, force, self.channels, self.source)
         checks.refuse_other_mass(vehicle, self.channels, self.source)
+
+    def _missing(self, column: str, problem: str, hint: str) -> InputError:
+        unused = "".join(n[len(checks.UNUSED) : -1] for n in self.notes if n.startswith(checks.UNUSED))
+        near = nearest(column, unused.split(", "))
+        if near:
+            hint = f"the nearest column is {near!r}: rename it, or map it in a profile"
+        return self._unfit(column, problem, hint, "vehicle#signals-that-are-missing")
 
     def _unfit(self, column: str, problem: str, hint: str, page: str | None = None) -> InputError:
         return InputError(problem, file=self.source, place=f"column {column}", hint=hint, page=page)
