@@ -87,6 +87,7 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
         (["--source", "mqtt://h/{vehicle}/s", "--index", "name.csv"], "name.csv: row 2: '../x' is not a vehicle's name"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "empty.csv"], "empty.csv: names no vehicle"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "lost.csv"], "nowhere.yaml"),
+        (["--source", "mqtt://h/{vehicle}/s", "--index", "none.csv"], "no vehicle file for t1; write one in its row"),
         (["--source", "mqtt://h/{vehicle}/s", "--vehicle", "robot.yaml", "--memory", "much"], "'much' is not an amount"),
         (["--source", "mqtt://h/{vehicle}/s", "--vehicle", "robot.yaml", "--record", "robot.yaml"], "robot.yaml"),
         (["--source", "mqtt://h/s", "--sink", "mqtt://h/{vehicle}", "--vehicle", "robot.yaml"], "not one whole level"),
@@ -99,7 +100,7 @@ def test_refused_in_one_line(tmp_path, vehicle, monkeypatch, capsys, options, wh
     vehicle.save(tmp_path / "robot.yaml")
     for name, text in {
         "odd": "name,log\na,b\n", "twice": "name\na\na\n", "name": "name,vehicle\n../x,robot.yaml\n",
-        "empty": "name,vehicle\n", "lost": "name,vehicle\na,nowhere.yaml\nb,nowhere.yaml\n",
+        "empty": "name,vehicle\n", "none": "name,vehicle\nt1,\n", "lost": "name,vehicle\na,nowhere.yaml\nb,nowhere.yaml\n",
     }.items():  # fmt: skip
         (tmp_path / f"{name}.csv").write_text(text)
     before = sorted(tmp_path.iterdir())

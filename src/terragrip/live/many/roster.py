@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terragrip.errors import InputError, suggestion
+from terragrip.errors import InputError
 from terragrip.listing import listed, profile_in
 from terragrip.live.topics import is_name
 
@@ -56,7 +56,7 @@ class Roster:
         vehicle, profile = self._rows.get(name, (None, None))
         vehicle, profile = vehicle or self._vehicle, profile or self._profile
         if vehicle is None:
-            hint = suggestion(name, self._rows, "add its row, or give --vehicle for all others")
+            hint = "write one in its row, or give --vehicle for all others"
             raise InputError(f"names no vehicle file for {name}", file=self._index, hint=hint)
         return self._loaded("vehicle", vehicle), self._loaded("profile", profile) if profile else None
 
