@@ -222,6 +222,31 @@ def test_a_scale_that_only_the_user_knows_is_asked_for_and_the_choice_is_that_of
     page.wait_for_selector("[aria-label='Scale of drive_torque_rr'][value='3']", state="attached")
 
 
+def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
+    page: Any, served: Served, folder: Path, foreign: Path
+) -> None:
+    """A look at another page lost the columns chosen by hand, a second choice of the class every number of the machine."""
+    pd.read_csv(foreign, nrows=2000).to_csv(folder / "day2.csv", index=False)
+    page.goto(f"{served.url}/#/start?log=day2.csv")
+    page.wait_for_selector("#column-ground_speed")
+    page.select_option("#column-pitch", "")
+    page.select_option("#machine-class", "tractor-2wd")
+    page.fill("#machine-mass", "139 kg")
+    page.wait_for_selector("#typical-mass:text-is('139 kg')")
+    page.select_option("#machine-class", "field-robot")
+    page.wait_for_selector("#typical-wheel_radius:has-text('Innok Heros')")
+    page.wait_for_selector("#typical-mass:text-is('139 kg')")
+    page.reload()
+    page.wait_for_selector("#choose-columns >> text=not saved yet")
+    assert page.input_value("#column-pitch") == ""
+    page.wait_for_selector("#typical-mass:text-is('139 kg')")
+    assert page.input_value("#machine-class") == "field-robot"
+    page.click("#use-columns")
+    page.wait_for_selector("#wizard-profile option[value='day2-profile.yaml']", state="attached")
+    page.reload()
+    page.wait_for_selector("#choose-columns >> text=The choice saved in", state="attached")
+
+
 def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(
     page: Any, served: Served, folder: Path, made: Path
 ) -> None:

@@ -134,6 +134,7 @@ export class LogPage {
   /** Read the log by another profile, or ("") by none, with what is proposed: the profile before stays in the folder. */
   private async readBy(profile: string): Promise<void> {
     [this.profile, this.left] = [profile, ""];
+    this.mapping?.forget();
     bind(this.key, { profile });
     this.look = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), profile);
     this.drawColumns(profile ? (document.getElementById("choose-columns") as HTMLDetailsElement | null)?.open ?? false : true);

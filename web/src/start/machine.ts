@@ -3,6 +3,7 @@
 import { get, send } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
+import { draftOf, keepDraft } from "./draft";
 import { row } from "./fields";
 import { commandLine } from "./jobs";
 import { sketch, type Vehicle } from "./sketch";
@@ -24,6 +25,13 @@ interface Made {
   fields: Field[];
   vehicle: Vehicle;
   text: string;
+}
+
+interface Wanted {
+  machine: string;
+  signals: string;
+  known: Record<string, string>;
+  name: string;
 }
 
 interface Cost {
@@ -53,6 +61,7 @@ export class MachineMaker {
   private problem = h("p", { class: "bad", role: "alert", id: "machine-problem" });
   private save = h("button", { type: "submit", class: "primary", id: "save-machine", disabled: true }, "Save the vehicle file");
   private shown = ""; // class and signals that the fields are of
+  private typed: Record<string, string> = {}; // numbers for fields that are drawn next
   private timer = 0;
   private turn = 0;
 
@@ -79,7 +88,18 @@ export class MachineMaker {
       const all = await get<{ classes: { name: string; title: string }[]; signals: Record<string, string> }>("machines");
       fill(this.kind, h("option", { value: "" }, "– choose –"), all.classes.map((one) => h("option", { value: one.name }, one.title)));
       fill(this.signals, Object.entries(all.signals).map(([name, title]) => h("option", { value: name, selected: name === signals }, title)));
+      this.takeUp(output);
     });
+  }
+
+  /** Go on with what was typed and not saved; the draft is that of the file proposed. */
+  private takeUp(output: string): void {
+    for (const event of ["input", "change"]) this.element.addEventListener(event, () => keepDraft(output, this.wanted));
+    this.element.addEventListener("kept", () => keepDraft(output, null));
+    const draft = draftOf<Wanted>(output);
+    if (!draft) return;
+    [this.kind.value, this.signals.value, this.name.value, this.typed] = [draft.machine, draft.signals, draft.name, draft.known];
+    void this.look();
   }
 
   /** What the log measures, by the columns that were chosen. */
@@ -89,8 +109,8 @@ export class MachineMaker {
     void this.look();
   }
 
-  private get wanted(): Record<string, unknown> {
-    const known = Object.fromEntries([...this.inputs].map(([name, field]) => [name, field.value.trim()]).filter(([, value]) => value));
+  private get wanted(): Wanted {
+    const known = Object.fromEntries([...this.inputs].map(([name, field]) => [name, field.value.trim()]).filter(([, value]) => value)) as Record<string, string>;
     return { machine: this.kind.value, signals: this.signals.value, known, name: this.name.value };
   }
 
@@ -98,18 +118,25 @@ export class MachineMaker {
     if (!this.kind.value) return;
     const turn = ++this.turn;
     const now = `${this.kind.value} ${this.signals.value}`;
-    if (now !== this.shown) this.inputs.clear();
+    if (now !== this.shown) {
+      if (this.inputs.size) this.typed = this.wanted.known; // stays where the other class asks for it too
+      this.inputs.clear();
+    }
     let made: Made;
     try {
-      made = await send<Made>("POST", "machines/made", this.wanted);
+      made = await send<Made>("POST", "machines/made", { ...this.wanted });
     } catch (error) {
       if (turn === this.turn) this.refuse(error instanceof Error ? error.message : String(error));
       return;
     }
     if (turn !== this.turn) return;
     this.refuse("");
-    if (now !== this.shown) this.drawFields(made.fields);
+    const isOther = now !== this.shown;
     this.shown = now;
+    if (isOther) {
+      this.drawFields(made.fields);
+      if (Object.keys(this.wanted.known).length) return this.look();
+    }
     this.drawTypical(made.fields);
     const known = new Set(made.fields.filter((field) => field.known !== null).map((field) => field.name));
     fill(this.picture, sketch(made.vehicle, known), h("details", {}, h("summary", {}, "The file"), h("pre", { tabindex: "0" }, made.text)));
@@ -133,7 +160,7 @@ export class MachineMaker {
 
   private drawFields(fields: Field[]): void {
     const asked = (field: Field): HTMLElement => {
-      const input = h("input", { type: "text", id: `machine-${field.name}`, placeholder: typical(field), "aria-describedby": `typical-${field.name}`, autocomplete: "off" });
+      const input = h("input", { type: "text", id: `machine-${field.name}`, value: this.typed[field.name] ?? "", placeholder: typical(field), "aria-describedby": `typical-${field.name}`, autocomplete: "off" });
       input.addEventListener("input", () => {
         clearTimeout(this.timer);
         this.timer = window.setTimeout(() => void this.look(), PAUSE);

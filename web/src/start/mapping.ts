@@ -4,6 +4,7 @@ import { get, send } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { numberField } from "../ui/number";
+import { draftOf, keepDraft } from "./draft";
 import { svg } from "./sketch";
 import { WheelNames } from "./wheels";
 
@@ -57,6 +58,15 @@ interface Choice {
   entry: Entry;
 }
 
+/** What was chosen and not saved yet: of the log with these rows and columns, from the choice of this profile on. */
+interface Draft {
+  of: string;
+  profile: string;
+  chosen: [string, Choice][];
+  time: Entry | null;
+  names: [string, string][];
+}
+
 export const SIGNALS = { torque: "drive_torque_", wheels: "wheel_speed_" };
 
 export class Mapping {
@@ -75,7 +85,30 @@ export class Mapping {
   constructor(
     private log: string,
     private saved: (profile: string) => void,
-  ) {}
+  ) {
+    for (const event of ["change", "click"]) this.element.addEventListener(event, () => this.keep());
+  }
+
+  private keep(): void {
+    if (!this.look) return;
+    const draft: Draft = { of: contents(this.look), profile: this.profile, chosen: [...this.chosen], time: this.look.time, names: [...this.names.given] };
+    keepDraft(this.log, draft);
+  }
+
+  /** Give up what was not saved. */
+  forget(): void {
+    keepDraft(this.log, null);
+  }
+
+  /** Go on with what was not saved; whether there was such a thing. */
+  private takeUp(look: Look): boolean {
+    const draft = draftOf<Draft>(this.log);
+    if (!draft || draft.of !== contents(look) || draft.profile !== this.profile) return false;
+    this.chosen = new Map(draft.chosen);
+    look.time = draft.time;
+    this.names.given = new Map(draft.names);
+    return true;
+  }
 
   /** Preview the log, with the choice that a `profile` has, else what is proposed; `output` is the profile to write in place of it. */
   async open(output: string, profile = ""): Promise<Look | undefined> {
@@ -102,8 +135,10 @@ export class Mapping {
     this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
     if (kept?.time) this.look.time = kept.time;
+    const hint = this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”.";
+    const unsaved = this.takeUp(this.look);
     this.names.of(this.look.channels);
-    this.draw(this.profile || output, profile);
+    this.draw(this.profile || output, unsaved ? "Your choice as you left it, not saved yet." : hint);
     return this.look;
   }
 
@@ -147,7 +182,7 @@ export class Mapping {
     this.wheels.push(...wheels);
   }
 
-  private draw(output: string, profile: string): void {
+  private draw(output: string, hint: string): void {
     const look = this.look as Look;
     const name = h("input", { type: "text", id: "profile-output", value: output });
     const use = h("button", { type: "button", class: "primary", id: "use-columns", click: () => void this.save(name.value.trim()) }, "Use these columns");
@@ -157,7 +192,7 @@ export class Mapping {
     fill(
       this.element,
       this.refused,
-      h("p", { class: "hint" }, this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”."),
+      h("p", { class: "hint" }, hint),
       look.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
       this.timeRow(look),
@@ -291,9 +326,14 @@ export class Mapping {
     const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, replace: isOld || output === this.own };
     const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted), "columns");
     if (!kept) return;
-    this.own = kept.path;
+    this.own = this.profile = kept.path;
+    this.forget();
     this.saved(kept.path);
   }
+}
+
+function contents(look: Look): string {
+  return [look.rows, ...look.columns.map((column) => column.name)].join("\n");
 }
 
 function option(value: string, text: string, selected: boolean): HTMLElement {

@@ -17,7 +17,7 @@ const AXLE = /^vertical_load_/;
 
 export class WheelNames {
   readonly element = h("div", { class: "wheel-names" });
-  private given = new Map<string, string>();
+  given = new Map<string, string>();
   private parts: Parts = { wheels: [], axles: [] };
   private channels: Channel[] = [];
 
