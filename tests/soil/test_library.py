@@ -213,6 +213,10 @@ def test_digitised_points(tmp_path):
     assert "per cent" in clay.notes[0]
     (tmp_path / "q.csv").write_text("0,05;0,1\n0,2;0,3\n")
     np.testing.assert_allclose(read_points(tmp_path / "q.csv")[0].slip, [0.05, 0.2])
+    (tmp_path / "r.csv").write_text("slip [%],clay,clay 20 %,\n0.2,.01,.2,.1\n0.9,.06,.9,.6\n")
+    small, wet = read_points(tmp_path / "r.csv")
+    np.testing.assert_allclose(small.slip, [0.002, 0.009])  # a rigid wheel's: it was 20 and 90 % of slip
+    np.testing.assert_allclose(wet.slip, [0.2, 0.9])
 
 
 @pytest.mark.parametrize(

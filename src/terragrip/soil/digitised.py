@@ -21,6 +21,8 @@ from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.text import to_text
 
 _STAMPS = ("time", "timestamp", "zeit")
+_PER_CENT = re.compile(r"(?:^|[^\W\d])\W*%\W*$")
+"""A column's unit, as in 'slip [%]'; not a soil's name, as 'clay 20 %'."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class DigitisedCurve:
 def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
     """Read pairs of columns (slip, value), several curves side by side as WebPlotDigitizer writes them; header rows are optional.
 
-    Comma, semicolon, tab or spaces; decimal comma where the separator is not a comma. Slips above 1.5 are read as per cent (noted).
+    Comma, semicolon, tab or spaces; decimal comma where the separator is not a comma. Slips are per cent where their header says [%], or
+    one is above 1.5 (noted).
     InputError: no such file, not text, no numbers, a cell that is not a number (row and cell named), an odd number of columns.
     """
     file = os.fspath(path)
@@ -59,7 +62,10 @@ def read_points(path: str | os.PathLike[str]) -> list[DigitisedCurve]:
             f"has {width} columns", file=file, hint="give a pair of columns (slip, value) for each curve"
         )
     columns = [_numbers(body, i, first, file) for i in range(width)]
-    return [_curve(columns[i], columns[i + 1], _title(head, i), file) for i in range(0, width, 2)]
+    return [
+        _curve(columns[i], columns[i + 1], _title(head, i), file, per_cent=_is_per_cent(head, i))
+        for i in range(0, width, 2)
+    ]
 
 
 def _refuse_a_log(head: list[list[str]], file: str) -> None:
@@ -108,18 +114,26 @@ def _numbers(body: list[list[str]], column: int, first: int, file: str) -> Float
 def _title(head: list[list[str]], column: int) -> str:
     for row in head:
         name = row[column] if column < len(row) else ""
-        if name and name.split("[")[0].strip().casefold() not in ("x", "slip", "s"):
+        if (
+            name
+            and not _PER_CENT.search(name)
+            and name.split("[")[0].strip().casefold() not in ("x", "slip", "s")
+        ):
             return name
     return f"curve {column // 2 + 1}"
 
 
-def _curve(slip: Floats, value: Floats, name: str, file: str) -> DigitisedCurve:
+def _is_per_cent(head: list[list[str]], column: int) -> bool:
+    return any(_PER_CENT.search(cell) for row in head for cell in row[column : column + 1])
+
+
+def _curve(slip: Floats, value: Floats, name: str, file: str, *, per_cent: bool) -> DigitisedCurve:
     good = np.isfinite(slip) & np.isfinite(value)
     slip, value = slip[good], value[good]
     if slip.size < 2:
         raise InputError(f"{name} has {slip.size} points", file=file, hint="digitise at least two")
     notes: tuple[str, ...] = ()
-    if np.abs(slip).max() > 1.5:
+    if per_cent or np.abs(slip).max() > 1.5:
         slip, notes = slip / 100, ("slip was read as per cent",)
     if np.abs(slip).max() > 1.05:
         raise InputError(
