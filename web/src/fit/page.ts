@@ -140,19 +140,17 @@ async function keep(state: State): Promise<void> {
     source: curve.source,
     ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins, clusters: fitted.clusters || null, common_slip_sd: fitted.common_slip_sd ?? null } : {}),
   };
-  const store = (replace: boolean): Promise<unknown> => send("POST", "soils/save", { ...soil, replace });
-  try {
-    await store(false);
-  } catch (error) {
-    const text = error instanceof Error ? error.message : String(error);
-    if (!text.includes("both libraries hold")) {
-      note(text, "error");
-      return;
+  const store = async (): Promise<boolean> => {
+    try {
+      await send("POST", "soils/save", { ...soil, replace: false });
+    } catch (error) {
+      if (!(error instanceof Error && error.message.includes("both libraries hold"))) throw error;
+      if (!confirm(`${library} holds a soil named ${curve.name} already. Replace it?`)) return false;
+      await send("POST", "soils/save", { ...soil, replace: true });
     }
-    if (!confirm(`${library} holds a soil named ${curve.name} already. Replace it?`)) return;
-    if (!(await tried(() => store(true)))) return;
-  }
-  note(`${curve.name} saved to ${library}`);
+    return true;
+  };
+  if (await tried(store, "library")) note(`${curve.name} saved to ${library}`);
 }
 
 async function png(plot: Plot): Promise<void> {
