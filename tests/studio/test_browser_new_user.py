@@ -223,7 +223,7 @@ def test_a_scale_that_only_the_user_knows_is_asked_for_and_the_choice_is_that_of
 
 
 def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
-    page: Any, served: Served, folder: Path, foreign: Path
+    page: Any, served: Served, folder: Path, foreign: Path, made: Path
 ) -> None:
     """A look at another page lost the columns chosen by hand, a second choice of the class every number of the machine."""
     pd.read_csv(foreign, nrows=2000).to_csv(folder / "day2.csv", index=False)
@@ -245,6 +245,17 @@ def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
     page.wait_for_selector("#wizard-profile option[value='day2-profile.yaml']", state="attached")
     page.reload()
     page.wait_for_selector("#choose-columns >> text=The choice saved in", state="attached")
+    page.click("#choose-columns summary")
+    page.select_option("#column-ground_speed", "")
+    (folder / "vehicle.yaml").write_bytes((made / "vehicle.yaml").read_bytes())
+    page.select_option("#wizard-vehicle", "vehicle.yaml")
+    page.wait_for_selector("#wizard-go:enabled")
+    asked: list[str] = []
+    page.once("dialog", lambda dialog: (asked.append(dialog.message), dialog.dismiss()))
+    page.click("#wizard-go")  # it estimated by the profile as saved, under a form that showed another choice
+    assert asked == [
+        "The columns were changed, and the change is not used yet. Estimate by day2-profile.yaml as it is?"
+    ]
 
 
 def test_a_command_over_ticked_files_and_the_focus_stays_at_its_button(

@@ -249,6 +249,7 @@ export class LogPage {
     );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
+      if (this.mapping?.isUnsaved && !confirm(`The columns were changed, and the change is not used yet. Estimate ${this.profile ? `by ${this.profile} as it is` : "without it"}?`)) return;
       const wanted = { recording: this.log, vehicle: this.vehicle, profile: this.profile || null, method: method.value, smooth: smooth.checked };
       void this.queue("estimate", wanted, output.value.trim());
     });

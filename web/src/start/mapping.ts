@@ -80,6 +80,7 @@ export class Mapping {
   private kept = new Map<string, Choice>(); // what the profile has that the choice began with
   private profile = "";
   private turn = 0;
+  private began = ""; // the choice as it was opened or saved
   readonly names = new WheelNames(() => this.nameRows());
 
   constructor(
@@ -93,6 +94,15 @@ export class Mapping {
     if (!this.look) return;
     const draft: Draft = { of: contents(this.look), profile: this.profile, chosen: [...this.chosen], time: this.look.time, names: [...this.names.given] };
     keepDraft(this.log, draft);
+  }
+
+  /** Whether the choice differs from what the profile has, or from what was proposed. */
+  get isUnsaved(): boolean {
+    return this.state() !== this.began;
+  }
+
+  private state(): string {
+    return JSON.stringify([[...this.chosen].sort(), this.look?.time, [...this.names.given]]);
   }
 
   /** Give up what was not saved. */
@@ -136,6 +146,7 @@ export class Mapping {
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
     if (kept?.time) this.look.time = kept.time;
     const hint = this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”.";
+    this.began = this.state();
     const unsaved = this.takeUp(this.look);
     this.names.of(this.look.channels);
     this.draw(this.profile || output, unsaved ? "Your choice as you left it, not saved yet." : hint);
@@ -327,6 +338,7 @@ export class Mapping {
     const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted), "columns");
     if (!kept) return;
     this.own = this.profile = kept.path;
+    this.began = this.state();
     this.forget();
     this.saved(kept.path);
   }
