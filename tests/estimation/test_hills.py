@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import drives
 from terragrip.estimation import Estimates, estimate
 from terragrip.simulation import SimulationResult, simulate
 from terragrip.simulation.families import Kind, scenario
@@ -82,3 +83,11 @@ def test_hills_widen_resistance_only_where_nothing_tells_them() -> None:
     assert spread[0.1, "neither"] > 3 * spread[0.0, "neither"]
     assert spread[0.1, "accelerometer"] < 1.5 * spread[0.0, "accelerometer"]
     assert spread[0.0, "neither"] < 2 * spread[0.0, "accelerometer"]
+
+
+def test_a_pitch_sensor_that_is_knocked_is_believed_again_within_a_quarter_of_a_minute() -> None:
+    """By .03 rad, which is .03 of soil resistance: the accelerometer and the ground speed show that it was no hill."""
+    log = drives.drive(60.0, rate=20.0, imu=True).recording
+    knocked = log["pitch"] + np.where(log.time > 20, 0.03, 0.0)
+    resistance = estimate(log.with_channels(pitch=knocked), drives.robot())["soil_resistance"]
+    assert abs(float(np.mean(resistance[(log.time > 35) & (log.time < 45)])) - 0.08) < 0.005

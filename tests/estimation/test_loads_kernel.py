@@ -165,3 +165,13 @@ def test_a_torque_that_two_wheels_share_is_theirs_but_for_the_differential():
     added = np.sqrt(shared["adhesion_rl_std"][-1] ** 2 - own["adhesion_rl_std"][-1] ** 2)
     assert added == pytest.approx(0.05 * (own["adhesion_rl"][-1] + 0.02), rel=0.2)
     assert shared["soil_resistance_std"][-1] == pytest.approx(own["soil_resistance_std"][-1], rel=0.05)
+
+
+def test_an_accelerometer_that_falls_silent_holds_no_load_back_for_longer_than_a_second():
+    """It speeds up by 1 m/s² until .2 s after the accelerometer's last value, then drives steadily: 65 N come back to the front."""
+    moved = drive(12.0, rate=50.0, imu=True, speed=lambda t: 0.3 + np.clip(t - 9, 0, 0.8))
+    log, time = moved.recording, moved.recording.time
+    silent = np.where(time < 9.6, log["acceleration_x"], np.nan)
+    estimates = estimate(log.with_channels(acceleration_x=silent), robot())
+    off = np.abs(estimates["vertical_load_front"] - moved.truth["vertical_load_front"])
+    assert off[(time > 10.9) & (time < 11.5)].max() < 30

@@ -83,3 +83,14 @@ def test_wheels_that_swing_in_the_air_do_not_turn_the_vehicle_round():
     found = estimate(replace(made.recording, channels=channels), robot())
     assert np.abs(found["ground_speed"] - made.truth["ground_speed"])[swings].max() < 0.3
     assert np.abs(found["adhesion_fl"] - made.truth["adhesion_fl"])[swings].max() < 0.3
+
+
+def test_a_start_makes_no_ground_speed_unsure_between_a_slow_receivers_values():
+    """At 5 Hz among wheels at 50 Hz: what is unknown where the motion begins is the adhesion."""
+    moved = drive(
+        12.0, rate=50.0, noise=0.5, speed=lambda t: 0.6 * np.clip(np.where(t < 7, 6 - t, t - 8), 0, 1)
+    )
+    log, time = moved.recording, moved.recording.time
+    slow = np.where(np.arange(len(time)) % 10 == 3, log["ground_speed"], np.nan)
+    deviation = estimate(log.with_channels(ground_speed=slow), robot(), held={})["ground_speed_std"]
+    assert deviation[(time > 7) & (time < 10)].max() < 3 * deviation[(time > 2) & (time < 5)].max()

@@ -134,3 +134,33 @@ def test_slip_that_rises_slowly_warns_once_it_will_surely_be_far_beyond_its_usua
     far = (slip - deviation + rise > least) & (table.time > 20)
     assert (table["warning"][far] > LIMITS["warn"]).all()
     assert begins(table, "immobilization")[-1] == pytest.approx(table.time[np.argmax(far)], abs=0.2 * UNIT)
+
+
+def test_where_one_axle_drives_no_leading_wheels_lose_adhesion_to_others() -> None:
+    """Adhesion of the front wheels alone, by turns above and below 0."""
+    log = steady_rims(lambda t: 0.05 * np.cos(t / 2), 20.0, 20.0, noise=0.0, pull_known=True)
+    front = {n: v for n, v in log.channels.items() if not n.startswith("drive_torque_r")}
+    axles = robot().to_dict()["axles"]
+    vehicle = robot(axles={**axles, "rear": {**axles["rear"], "driven": False}})
+    table = estimate(Recording(log.time, front), vehicle)
+    assert table["adhesion_fl"].min() < -0.05 < 0.05 < table["adhesion_fl"].max()
+    assert not table["warning_leading"].any()
+
+
+def test_how_large_an_unmeasured_pull_may_be_changes_no_warning() -> None:
+    """A pull that stays is in no rise of the resistance, whatever it is."""
+    harder = later(12.0, 0.015)
+    log = steady_rims(
+        lambda t: 0.1 + 3 * np.minimum(harder(t), 0.1),
+        20.0,
+        20.0,
+        noise=1.0,
+        resistance=lambda t: 0.08 + harder(t),
+    )
+    of_none, of_some = (
+        estimate(log, robot(uncertainty={"drive_torque_gain": 0.02, "drawbar_force": pull}), held={})
+        for pull in (0.0, 250.0)
+    )
+    under_way = log.time > 8  # at first the resistance itself is unknown
+    assert of_none["warning"].max() > 3
+    np.testing.assert_allclose(of_some["warning"][under_way], of_none["warning"][under_way], atol=0.01)
