@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from terragrip.estimation import Calibration, calibrate
 from terragrip.estimation.calibration.gains import _disagreement
@@ -57,6 +59,12 @@ def test_a_common_gain_leaves_no_trace_and_is_said_to(drive: Make, vehicle: Vehi
     assert np.mean(np.log([result[f"drive_torque_gain {w}"].value for w in WHEELS])) == pytest.approx(
         0, abs=1e-9
     )
+
+
+def test_an_interval_has_the_degrees_of_freedom_of_its_stretches(drive: Make, vehicle: Vehicle) -> None:
+    quantity = calibrate(drive(gain=GAIN), vehicle)["drive_torque_gain fl"]
+    (stretches,) = re.findall(r"on (\d+) stretches", quantity.sentence)
+    assert quantity.factor == pytest.approx(student.ppf(0.975, int(stretches) - 1))
 
 
 def test_intervals_hold_over_noise_and_patchy_ground(drive: Make, vehicle: Vehicle) -> None:
