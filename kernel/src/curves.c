@@ -22,13 +22,14 @@ tg_status tg_estimator_new_ground(tg_estimator *e)
     return TG_OK;
 }
 
-/* A wheel's pair. What an estimate's spread holds beyond the filter's variance is constant: it does not average out. */
+/* A wheel's pair. What an estimate's spread holds beyond the filter's variance is constant: it does not average out, but
+ * for what the sides take from each other. */
 static tg_pair pair_of(const tg_estimator *e, int32_t i, const tg_real *o)
 {
     const int32_t stride = tgi_stride(e->settings.machine.wheels);
     const tg_real radius = e->settings.uncertainty.wheel_radius, travel = 1 - tgi_fabs(o[TG_OUT_SLIP + i]);
     const tg_real random = e->belief.P[i * stride + i] + tgi_rough_adhesion(&e->scene, o[TG_OUT_ADHESION + i]);
-    const tg_real constant = tgi_square(o[TG_OUT_ADHESION_STD + i]) - random - tgi_square(o[TG_OUT_ADHESION + i] * radius);
+    const tg_real constant = tgi_square(o[TG_OUT_ADHESION_STD + i]) - random - e->scene.sides[i] - tgi_square(o[TG_OUT_ADHESION + i] * radius);
     const tg_real slip = tgi_square(o[TG_OUT_SLIP_STD + i]) - tgi_square(travel * radius);
     const tg_pair pair = {o[TG_OUT_ADHESION + i], o[TG_OUT_SLIP + i], random, slip > 0 ? slip : 0,
                           tgi_root(constant), radius};

@@ -29,8 +29,8 @@ static tg_real unseen_lateral(const tg_estimator *e, const tg_row *row)
 
 /* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. The square of
  * a torque's leap that its next sample has not confirmed, times how likely it is real: the more, the more of the time over which increments
- * are known lies between two samples, and the less it exceeds what two adhesions differ by. And shares of the wheel's torque, by a load
- * that side slopes shift and by the friction of a differential. */
+ * are known lies between two samples, and the less it exceeds what two adhesions differ by. And shares of the wheel's torque, which the
+ * other side has more: by a load that side slopes shift, and by the friction of a differential. */
 void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
@@ -40,7 +40,7 @@ void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *dri
         const tg_real square = row->chatter[i], arm = s->machine.radius[i] * drive->load[i];
         const tg_real gross = e->belief.x[i] + s->machine.tire_rolling_resistance, lever = s->lateral_share[i] / s->wheel_share[i];
         e->scene.doubt[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (arm * e->wheel[i].interval)) : 0;
-        e->scene.doubt[i] += tgi_square(gross) * (tgi_square(lever) * lateral + (e->shared[i] == TG_SAME ? tgi_square(TG_LOCKING) : 0));
+        e->scene.sides[i] = tgi_square(gross) * (tgi_square(lever) * lateral + (e->shared[i] == TG_SAME ? tgi_square(TG_LOCKING) : 0));
         if (!(torque->spike > 0)) continue;
         const tg_real leap = torque->spike / tgi_square(arm), real = tgi_exp(-leap / (4 * tgi_square(s->prior_adhesion_std)));
         e->scene.doubt[i] += leap * real * torque->interval / (s->tuned.increment_memory + torque->interval);

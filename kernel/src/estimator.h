@@ -52,7 +52,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real load[8]; /* wheel, N */
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
-    tg_real doubt[8]; /* wheel: variance of an adhesion that alternates from sample to sample, or whose torque may have leapt or be no share of its own, see doubt.c */
+    tg_real doubt[8]; /* wheel: variance of an adhesion that alternates from sample to sample, or whose torque may have leapt, see doubt.c, */
+    tg_real sides[8]; /* and of one by as much as the other side's is off the other way: the vehicle's forces do not contain it */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real turn[8]; /* wheel: variance of its slip by a turn that no sensor shows */
     tg_real silent[8]; /* wheel: 2 where its speed is silent while others are measured, 1 where its drive torque is */

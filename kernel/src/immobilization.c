@@ -74,7 +74,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], deviation, rim);
         l.rim += rim;
         adhesion += mu;
-        l.adhesion_deviation += tgi_square(o[TG_OUT_ADHESION_STD + i]);
+        l.adhesion_deviation += tgi_square(o[TG_OUT_ADHESION_STD + i]) - e->scene.sides[i];
         l.leading += end > 0 ? mu : 0;
         l.trailing += end < 0 ? mu : 0;
         ahead += end > 0;

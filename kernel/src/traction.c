@@ -27,7 +27,7 @@ TG_INLINE tgi_moments moments_of(const tg_belief *b, const tg_real (*S)[TG_MAX_C
     const int r = n, v = n + 1, w = n + 2 + i, columns = b->columns;
     const tg_real *const P = b->P, *const Pw = P + w * stride;
     tgi_moments c;
-    c.mm = every(P + i * (stride + 1), stride + 1) + products(S, i, i, 1, columns) + (scene->unseen_load * (mu * mu) + lanes_load(scene->doubt + i));
+    c.mm = every(P + i * (stride + 1), stride + 1) + products(S, i, i, 1, columns) + (scene->unseen_load * (mu * mu) + lanes_load(scene->doubt + i) + lanes_load(scene->sides + i));
     c.mr = lanes_load(P + r * stride + i) + products(S, i, r, 0, columns);
     c.vm = lanes_load(P + v * stride + i) + products(S, i, v, 0, columns);
     c.wm = every(Pw + i, stride + 1) + products(S, w, i, 1, columns);
