@@ -138,17 +138,22 @@ def _around(tree: Any, place: Floats, value: Floats, constants: Floats) -> tuple
         for sign in (-1.0, 1.0):
             inside = near & (sign * offset[:, :, axis] > 0)
             enough = inside.sum(axis=1) >= SIDE
-            median = np.full(len(place), np.nan)
-            median[enough] = np.nanmedian(np.where(inside, value[index], np.nan)[enough], axis=1)
-            sides.append(median)
+            sides.append(_medians(np.where(inside & enough[:, None], value[index], np.nan)))
     low, high = np.fmin.reduce(sides), np.fmax.reduce(sides)
     known = (near.sum(axis=1) >= AROUND // 2) & np.isfinite(low)
     away = np.abs(np.array(sides) - value)
     nearest = np.array(sides)[np.where(np.isfinite(away), away, np.inf).argmin(axis=0), np.arange(len(value))]
-    middle = np.full(constants.shape, np.nan)
-    for one, out in zip(constants.T, middle.T, strict=True):
-        out[known] = np.nanmedian(np.where(near, one[index], np.nan)[known], axis=1)
+    around = near & known[:, None]
+    middle = np.reshape(
+        [_medians(np.where(around, one[index], np.nan)) for one in constants.T], constants.T.shape
+    ).T
     return np.where(known, np.clip(value, low, high), np.nan), np.where(known, nearest, np.nan), middle
+
+
+def _medians(values: Floats) -> Floats:
+    """The median (n,) of each row (n, k) without its NaN; `np.nanmedian`, by masked arrays, takes 20 times as long."""
+    ordered, count, rows = np.sort(values, axis=1), np.isfinite(values).sum(axis=1), np.arange(len(values))
+    return np.asarray((ordered[rows, (count - 1) // 2] + ordered[rows, count // 2]) / 2)
 
 
 def _joined(tree: Any, place: Floats, residual: Floats, variance: Floats) -> tuple[Floats, Floats]:

@@ -65,13 +65,13 @@ def _fitted(at: Floats, place: Floats, value: Floats, lever: Floats, weight: Flo
             rows = slice(start, start + CHUNK)
             i, w = index[rows], near[rows]
             design = np.concatenate([np.ones((*i.shape, 1)), place[i] - at[rows, None, :], lever[i]], axis=2)
-            normal = np.einsum("kni,kn,knj->kij", design, w, design)
+            weighted = w[:, :, None] * design
+            normal = np.swapaxes(weighted, 1, 2) @ design
             prior = variance * np.array([FLAT, FLAT, FLAT, 1.0, 1.0])
             inverse = np.linalg.inv(normal + np.diag(prior))
-            found = np.einsum("kij,knj,kn->ki", inverse, design, w * value[i])
+            found = (inverse @ np.einsum("knj,kn->kj", weighted, value[i])[:, :, None])[:, :, 0]
             slope[rows], covariance[rows] = found[:, 3:], variance * inverse[:, 3:, 3:]
             squares += float(np.sum(w * (value[i] - np.einsum("kni,ki->kn", design, found)) ** 2))
-            hat = np.einsum("kij,kni,knj,kn->k", inverse, design, design, w**2)
-            freedom += float(w.sum() - hat.sum())
+            freedom += float(w.sum() - np.sum(weighted @ inverse * weighted))
         variance = squares / max(freedom, 1e-9) + 1e-12
     return slope, covariance
