@@ -9,7 +9,7 @@ import numpy as np
 from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.held import measured_part
-from terragrip.recording.lag import lag_within
+from terragrip.recording.lag import Lag, lag_within
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import gaps
@@ -74,18 +74,21 @@ def drift_warnings(recording: Recording) -> list[str]:
     if "ground_speed" not in channels or not np.all(np.diff(time) > 0):
         return []
     third = (time[-1] - time[0]) / 3
-    lags = []
-    for k in range(3):
-        edges = time[0] + k * third + np.array([0.0, min(third, _PART)])
+
+    def lag_of(part: int) -> Lag | None:
+        edges = time[0] + part * third + np.array([0.0, min(third, _PART)])
         rows = slice(*np.searchsorted(time, edges))
-        lags.append(lag_within(time[rows], {name: values[rows] for name, values in channels.items()}))
-    first, middle, last = lags
-    if first is None or middle is None or last is None:
+        return lag_within(time[rows], {name: values[rows] for name, values in channels.items()})
+
+    def is_grown(*lags: Lag) -> bool:
+        return abs(grown) >= max(_DRIFT, _CERTAIN * error + max(lag.explained[1] for lag in lags))
+
+    if (first := lag_of(0)) is None or (last := lag_of(2)) is None:
         return []
     grown, error = last.seconds - first.seconds, float(np.hypot(first.std, last.std))
-    explained = max(lag.explained[1] for lag in (first, middle, last))
-    uneven = abs(middle.seconds - (first.seconds + last.seconds) / 2)
-    if abs(grown) < max(_DRIFT, _CERTAIN * error + explained) or uneven > _EVENLY * abs(grown):
+    if not is_grown(first, last) or (middle := lag_of(1)) is None or not is_grown(first, middle, last):
+        return []
+    if abs(middle.seconds - (first.seconds + last.seconds) / 2) > _EVENLY * abs(grown):
         return []
     return [
         f"ground_speed is {first.seconds:.2f} s behind the wheel speeds in the first third of the log, {middle.seconds:.2f} s in the "
