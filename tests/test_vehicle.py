@@ -146,6 +146,7 @@ def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
         ("0.15 kg m^2}", "0.15, radius_model: {name: fixed, pressure: 1}}", "wheel.radius_model.pressure", "unknown", "name"),
         ("mass: 139 kg", "mass: 139 kg\nmass: 140 kg", "mass (line 3)", "the key occurs twice", "line 2"),
         ("mass: 139 kg", "mass: [139 kg", "line 3", "not YAML", "key: value"),
+        ("wheels: [fl, fr]", "wheels: fl, fr", "axles.front.fr", "unknown key", "write it in brackets ('[..., fr]')"),
         ("mass: 139 kg", "\tmass: 139 kg", "line 2", "not YAML", "by blanks, not by tabs"),
         ("name: Innok Heros 444", "name: 444", "name (line 1)", "is not text", "quotes"),
         ("sensors: {wheel_speed: 0.03 rad/s", "sensors: {wheel_speed: 0", "sensors.wheel_speed", "impossible", "exceed"),

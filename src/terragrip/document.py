@@ -53,8 +53,14 @@ class Part(BaseModel):
         for key in data:
             if key not in known:
                 hint = suggestion(str(key), known, f"known keys are {', '.join(known)}")
-                if str(key)[:1].isdigit() and data[key] is None:  # YAML's comma has ended the value before it
-                    hint = f"part of a number with a decimal comma? write a decimal point ('0.{key}')"
+                if data[key] is None:  # YAML's comma has ended the value before it
+                    number = str(key)[:1].isdigit()
+                    lists = f"part of a list? write it in brackets ('[..., {key}]'); {hint}"
+                    hint = (
+                        f"part of a number with a decimal comma? write a decimal point ('0.{key}')"
+                        if number
+                        else lists
+                    )
                 raise PydanticCustomError("unknown_key", "unknown key", {"key": str(key), "hint": hint})
         return data
 
