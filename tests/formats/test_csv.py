@@ -571,6 +571,17 @@ def test_a_sheet_saved_with_title_lines_and_merged_cells_is_read_whole(tmp_path:
     } <= found.keys()
 
 
+def test_values_without_a_name_are_counted_and_an_empty_column_or_an_index_is_not(tmp_path: Path) -> None:
+    """A drawbar force whose name was lost was left out without a word."""
+    log = tmp_path / "log.csv"
+    rows = [f"{k},{k / 10},{1 + k % 3},2,,7\n" for k in range(30)]
+    log.write_text(",time,ground_speed,wheel_speed_l,,\n" + "".join(rows))
+    said = "Columns that have values but no name in the header were left out: 1."
+    assert [note for note in read(log).notes if "no name" in note] == [said]
+    log.write_text(",time,ground_speed,wheel_speed_l,,torque\n" + "".join(rows))
+    assert not any("no name" in note for note in read(log).notes)
+
+
 def test_names_with_blanks_hide_no_tab_where_cells_are_missing(tmp_path: Path) -> None:
     """Blanks made more cells numbers than tabs did."""
     names = ["time", "ground speed", "wheel speed fl", "wheel speed fr"]

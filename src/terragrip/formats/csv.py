@@ -43,6 +43,8 @@ def csv_on_disk(path: str) -> TableOnDisk:
     rows = max(1, round(length / max(len(head), 1) * head.count(b"\n")))
     size = int(np.clip(ROWS * length / rows, 1 << 20, 4 * _BLOCK))
     notes: list[str] = []
+    if dialect.unnamed:
+        notes.append(f"Columns that have values but no name in the header were left out: {dialect.unnamed}.")
 
     def blocks(names: list[str], every: int) -> Iterator[Columns]:
         chosen = [dialect.names.index(name) for name in names]

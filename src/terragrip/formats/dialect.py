@@ -28,6 +28,7 @@ class Dialect:
     """How a text table is written. ``separator`` " " stands for any run of blanks; ``start`` is where rows begin.
 
     ``in_cells``: the columns whose numbers have their unit behind them, by place, and that unit, which is also in ``units``.
+    ``unnamed``: how many columns of the first rows have values, but no name.
     """
 
     separator: str
@@ -36,6 +37,7 @@ class Dialect:
     units: dict[str, str]
     start: int
     in_cells: dict[int, str] = field(default_factory=dict)
+    unnamed: int = 0
 
 
 def detect(data: bytes, source: str) -> Dialect:
@@ -87,15 +89,16 @@ def detect(data: bytes, source: str) -> Dialect:
     names, notes = names_and_units(header)
     units = {names[header.index(h)]: u for h, u in units.items() if u}
     units = {**notes, **units}
+    columns = list(zip_longest(*(split(line, separator) for line in lines[rows:]), fillvalue=""))
     in_cells = {
         k: unit
-        for k, column in enumerate(
-            zip_longest(*(split(line, separator) for line in lines[rows:]), fillvalue="")
-        )
+        for k, column in enumerate(columns)
         if k < len(names) and (unit := _unit_in_all(column)) and units.get(names[k], unit) == unit
     }
     units |= {names[k]: unit for k, unit in in_cells.items()}
-    return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells)
+    others = zip(columns[1:], names[1:], strict=False)  # the first may be an index
+    unnamed = sum(any(column) for column, name in others if not name)
+    return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells, unnamed)
 
 
 def _unit_in_all(cells: tuple[str, ...]) -> str | None:
