@@ -8,13 +8,12 @@
 /* Whether two wheels of an axle have one torque, what the axle's is divided into. A torque of 0 shows nothing. */
 void tgi_watch_shares(tg_estimator *e, const tg_sample *sample)
 {
-    const tg_settings *s = &e->settings;
-    for (int32_t i = 0; i < s->machine.wheels; i++)
-        for (int32_t j = 0; j < s->machine.wheels; j++) {
-            const tg_real one = sample->value[TG_DRIVE_TORQUE + i], other = sample->value[TG_DRIVE_TORQUE + j];
-            if (j == i || s->wheel_axle[j] != s->wheel_axle[i] || !s->driven[i] || !s->driven[j] || isnan(one) || isnan(other) || (one == 0 && other == 0)) continue;
-            e->shared[i] = one != other ? 0 : e->shared[i] < TG_SAME ? e->shared[i] + 1 : TG_SAME;
-        }
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+        const int32_t twin = e->constants.twin[i];
+        const tg_real one = sample->value[TG_DRIVE_TORQUE + i], other = sample->value[TG_DRIVE_TORQUE + twin];
+        if (twin == i || isnan(one) || isnan(other) || (one == 0 && other == 0)) continue;
+        e->shared[i] = one != other ? 0 : e->shared[i] < TG_SAME ? e->shared[i] + 1 : TG_SAME;
+    }
 }
 
 /* Variance of the lateral specific force, where neither an accelerometer nor a roll shows it: hills have no direction, so the ground is as

@@ -226,15 +226,19 @@ static int has_channel(const tg_settings *s, int32_t slot)
     return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
 }
 
-/* Which wheels the watch looks at, and on which side of the machine they are. */
+/* Which wheels the watch looks at, on which side of the machine they are, and which other one drives on the same axle. */
 static void place_wheels(const tg_settings *s, tgi_constants *c)
 {
     int32_t any = 0;
     for (int32_t i = 0; i < s->machine.wheels; i++) any |= s->powered[i];
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         int32_t place = 0;
-        for (int32_t j = 0; j < s->machine.wheels; j++)
-            if (s->wheel_axle[j] == s->wheel_axle[i]) place += (j < i) - (j > i);
+        c->twin[i] = i;
+        for (int32_t j = 0; j < s->machine.wheels; j++) {
+            if (s->wheel_axle[j] != s->wheel_axle[i]) continue;
+            place += (j < i) - (j > i);
+            if (j != i && s->driven[i] && s->driven[j]) c->twin[i] = j;
+        }
         c->side[i] = place < 0 ? -1 : place > 0;
         c->watched[i] = !any || s->powered[i];
     }
