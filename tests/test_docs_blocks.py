@@ -1,6 +1,6 @@
 """Code on the pages of docs/ is right: each command line is one that the program takes, each Python block runs.
 
-Those of README, vehicle, export and ground-classifier run here, tutorials as a whole in tests/test_tutorial.py, the format of
+Those of README, vehicle, export, soils and ground-classifier run here, tutorials as a whole in tests/test_tutorial.py, the format of
 docs/formats.md in tests/formats/test_registry.py.
 """
 
@@ -21,6 +21,7 @@ import yaml
 import terragrip as tg
 from terragrip.cli.entry import program
 from terragrip.formats.profile import Profile, Source
+from terragrip.soil.library import SoilLibrary
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("docs/*.md"), ROOT / "README.md"])
@@ -76,7 +77,7 @@ def test_every_python_block_compiles(page: Path) -> None:
         compile(text, str(page), "exec")
 
 
-RUN_HERE = {"README", "vehicle", "export", "ground-classifier"}
+RUN_HERE = {"README", "vehicle", "export", "ground-classifier", "soils"}
 RUN_ELSEWHERE = {page.stem for page in ROOT.glob("docs/tutorial*.md")} | {"formats"}
 
 
@@ -145,6 +146,13 @@ def test_the_block_of_the_ground_classifier_page_runs(
     )
     names = run_blocks("ground-classifier")
     assert (names["grounds"].predict([names["drive"]]) == "snow").mean() > 0.8
+
+
+def test_the_block_of_the_soils_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run_blocks("soils")
+    (soil,) = SoilLibrary.load("cone.json").values()
+    assert soil.model == "brixius"
 
 
 def test_the_blocks_of_readme_and_of_the_vehicle_file_run(

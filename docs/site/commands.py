@@ -17,11 +17,7 @@ def page() -> str:
         " what, where and how to fix it; 1: a defect of Terragrip. Files appear whole or not at all.",
         _options(root),
     ]
-    parts += [
-        _section(f"terragrip {name}", command, 2)
-        for name, command in root.commands.items()
-        if not command.hidden
-    ]
+    parts += [_section(f"terragrip {name}", command, 2) for name, command in root.commands.items()]
     return "\n\n".join(parts) + "\n"
 
 

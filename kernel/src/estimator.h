@@ -366,6 +366,7 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);
 void tgi_rest_over(tg_estimator *e);
 void tgi_watch_innovation(tg_estimator *e, const tg_row *row, tg_real innovation, tg_real variance);
+tg_real tgi_alike_share(const tg_estimator *e);
 tg_real tgi_alike_variance(const tg_estimator *e);
 tg_real tgi_disputed_variance(const tg_estimator *e, const tg_drive *drive);
 tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive);

@@ -152,15 +152,24 @@ static tg_real scale_of_walks(const tg_estimator *e, tg_real dt)
     return mean;
 }
 
+/* Walk of rho_s by hills, 1/s: where nothing shows the slope, rho_s contains it (docs/decisions/0149). As far as ground speeds disagree
+ * with the forces; and no part of Q, whose scale in a bank follows the wheels' adhesions. */
+static tg_real unseen_hills(const tg_estimator *e)
+{
+    if (e->pitch.count > 0 || e->slope.running) return 0;
+    const tg_real walk = e->settings.tuned.terrain_walk * tgi_fabs(e->belief.x[e->settings.machine.wheels + 1]) / e->constants.mean_radius;
+    return walk * tgi_alike_share(e);
+}
+
 /* What adhesion and resistance, walking at random within the step, do to the ground speed in it: a third of the walk times dt^2. The filter
  * itself lets them walk after the step, which at 1 Hz would make an outlier of every start. */
-static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_real dt)
+static tg_real walking_forces(const tg_estimator *e, const tg_drive *drive, tg_real hills, tg_real dt)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
     tg_real walk = s->tuning.walk[2 * n + 1] * tgi_square(s->machine.gravity);
     for (int32_t i = 0; i < n; i++) walk += s->tuning.walk[n + 1 + i] * tgi_square(e->held.load[i] * drive->inverse_mass);
-    return scale_of_walks(e, dt) * walk * dt * dt * dt / 3;
+    return (scale_of_walks(e, dt) * walk + hills * tgi_square(s->machine.gravity)) * dt * dt * dt / 3;
 }
 
 /* Variance of the change of a wheel's speed from one sample to the next that the third reverses, beyond its white noise; 0 below
@@ -180,8 +189,10 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const tg_settings *s = &e->settings;
     const tgi_constants *c = &e->constants;
     const int32_t n = s->machine.wheels;
+    const tg_real hills = unseen_hills(e);
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
-    q[n] = walking_forces(e, drive, dt) + drive->drift_by_slope;
+    q[n] = walking_forces(e, drive, hills, dt) + drive->drift_by_slope;
+    q[2 * n + 1] = hills * dt;
     for (int32_t i = 0; i < n; i++) {
         row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);
         if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * dt / e->wheel[i].interval;

@@ -63,15 +63,29 @@ tg_real tgi_late_variance(const tg_estimator *e, const tg_drive *drive)
     return tgi_square(e->settings.ground_speed_delay * rate_of(e, drive));
 }
 
-/* What the filter has not followed of a disagreement between its model and the sensor: the mean product of neighbouring innovations, less
- * what chance makes of it. Either may be wrong: the model by the filter's own weight, K of the ground speed, and then all but 1 - K of it is
- * corrected; else the sensor. At 2 Hz, where forces predict the speed badly, K is near 1. */
-tg_real tgi_alike_variance(const tg_estimator *e)
+/* Mean product of neighbouring innovations, less what chance makes of it. */
+static tg_real alike(const tg_estimator *e)
 {
     const tgi_slow_speed *const s = &e->slow_speed;
-    if (!(s->alike > 0)) return 0;
-    const tg_real share = e->constants.variance[TG_GROUND_SPEED] / s->expected, less = share < 1 ? share : 1; /* 1 - K */
-    return less * (1 + less * (1 - less)) * tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0);
+    return s->alike > 0 ? tgi_max(s->alike - e->settings.tuned.alike_sure * s->expected / tgi_sqrt(s->pairs), 0) : 0;
+}
+
+/* The part of the innovations' variance by which they are alike: 0 where they are white, near 1 where the model is wrong. */
+tg_real tgi_alike_share(const tg_estimator *e)
+{
+    const tg_real beyond = alike(e);
+    return beyond > 0 ? beyond / (beyond + e->slow_speed.expected) : 0;
+}
+
+/* What the filter has not followed of a disagreement between its model and the sensor: the mean product of neighbouring innovations. Either
+ * may be wrong: the model by the filter's own weight, K of the ground speed, and then all but 1 - K of it is corrected; else the sensor. At
+ * 2 Hz, where forces predict the speed badly, K is near 1. */
+tg_real tgi_alike_variance(const tg_estimator *e)
+{
+    const tg_real beyond = alike(e);
+    if (!(beyond > 0)) return 0;
+    const tg_real share = e->constants.variance[TG_GROUND_SPEED] / e->slow_speed.expected, less = share < 1 ? share : 1; /* 1 - K */
+    return less * (1 + less * (1 - less)) * beyond;
 }
 
 /* That, and, while the speed changes, the age of a sample. */

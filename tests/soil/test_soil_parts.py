@@ -143,14 +143,14 @@ def test_slips_beyond_one_and_a_half_are_per_cent(most: float, divided: bool, re
     slip, value = np.array([most, 0.5, np.nan]), np.array([0.4, 0.2, 0.3])
     if refused:
         with pytest.raises(InputError, match=r"has a slip of 1\.06"):
-            _curve(slip, value, "c", "f.csv")
+            _curve(slip, value, "c", "f.csv", per_cent=False)
         return
-    curve = _curve(slip, value, "c", "f.csv")
+    curve = _curve(slip, value, "c", "f.csv", per_cent=False)
     np.testing.assert_allclose(curve.slip, sorted(slip[:2] / (100 if divided else 1)))
     assert curve.value.tolist() == [0.2, 0.4]
     assert bool(curve.notes) is divided
     with pytest.raises(InputError, match="c has 1 points"):
-        _curve(slip[1:], value[1:], "c", "f.csv")
+        _curve(slip[1:], value[1:], "c", "f.csv", per_cent=False)
 
 
 def test_separators_decimals_and_titles_of_digitised_points() -> None:
