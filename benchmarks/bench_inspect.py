@@ -24,9 +24,9 @@ import made_up_loggers
 from marked import put
 from terragrip.errors import InputError
 from terragrip.formats.channel_proposal import Proposal
-from terragrip.formats.inspect import Seen
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.reading import read_log
+from terragrip.formats.seen import Seen
 from terragrip.formats.vocabulary import GENERAL, UNIT_WORDS, Vocabulary, words_of
 from terragrip.recording.schema import CHANNELS, TIME, WHEEL_CHANNELS
 from terragrip.units import UnitError, parse_unit

@@ -5,39 +5,34 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import yaml
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.profile import Profile
-from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, profile_text, refusal
-from terragrip.formats.reading import read_log, recording_of
-from terragrip.formats.recognition import Proposals, propose, silent
+from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, refusal
+from terragrip.formats.reading import recording_of
+from terragrip.formats.recognition import silent
+from terragrip.formats.seen import Seen, read_whole_or_thinned, size_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.signs import add_signs
-from terragrip.formats.spoilt import notes_on, numbers_of
-from terragrip.formats.stamps import Stamps
-from terragrip.formats.table import LogTable, Sparse
-from terragrip.formats.time_column import TimeColumn, find_time, other_clocks
-from terragrip.formats.vocabulary import GENERAL, Vocabulary
+from terragrip.formats.spoilt import notes_on
+from terragrip.formats.table import LogTable
+from terragrip.formats.time_column import other_clocks
+from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.checks import NOTHING_TOWED, refuse_estimates
-from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
-from terragrip.recording.repeats import Repeats, merged
-from terragrip.recording.schema import LABELS, TIME, has_torque, is_own, unit_of
-from terragrip.units import factor_to
+from terragrip.recording.repeats import Repeats
+from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.vehicle import Vehicle
-from terragrip.written_times import times_of
 
-_LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 _SPARSE = (
     "The log is long ({:.1f} GB): one of every {} blocks of its records was read, spread over the log. Counts and "
     "shares refer to these; gaps are not searched for."
@@ -132,7 +127,7 @@ def inspect(
     refuse_estimates(log.names, str(log.source))
     warnings, recording = list(log.notes), None
     if every > 1:
-        warnings.insert(0, _SPARSE.format(_size(path) / 1e9, every))
+        warnings.insert(0, _SPARSE.format(size_of(path) / 1e9, every))
     fits = Fit()
     try:
         recording = _recording(log, chosen)
@@ -191,107 +186,6 @@ def inspect(
     )
 
 
-def read_whole_or_thinned(
-    path: str | os.PathLike[str], dbc: Sequence[str | os.PathLike[str]] = ()
-) -> tuple[LogTable | SignalLog, int]:
-    """A log as its columns, and of a long one which blocks: one of every so many, all over it (1: all of it). Raises as `read_log`."""
-    size = _size(path)
-    every = max(1, round(size / _ENOUGH)) if size > _LONG else 1
-    return read_log(path, Sparse(every) if every > 1 else None, tuple(dbc)), every
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What is known of a log: columns and units by name, the time's column and unit, its instants [s].
-
-    ``clocks``: the instants of signals that have their own.
-    """
-
-    columns: dict[str, npt.NDArray[Any]]
-    units: dict[str, str]
-    stamp: TimeColumn | None
-    base: Floats | None
-    clocks: dict[str, Floats]
-    since_1970: bool
-    whole: bool  # no block of the log was left out
-    repeats: Repeats = field(default_factory=Repeats)
-
-    @classmethod
-    def of(cls, log: LogTable | SignalLog, *, whole: bool = True, vocabulary: Vocabulary = GENERAL) -> Seen:
-        """What is seen of a log; ``whole``: no block of it was left out."""
-        if isinstance(log, SignalLog):
-            base = log.instants()
-            first = float(base[0]) if len(base) else 0.0
-            columns = {name: signal.values for name, signal in log.signals.items()}
-            units = {name: signal.unit for name, signal in log.signals.items() if signal.unit}
-            clocks = {name: signal.time - first for name, signal in log.signals.items()}
-            return cls(
-                columns, units, TimeColumn(TIME, "s"), base - first, clocks, since_1970=False, whole=whole
-            )
-        written = {n: v for n, c in log.columns.items() if (v := numbers_of(c)) is not None}
-        texts = {  # a block of them may hold numbers
-            n: [cell if isinstance(cell, str) else None for cell in c.tolist()]
-            for n, c in log.columns.items()
-            if c.dtype == object and n not in (*LABELS, *written)
-        }
-        dated = {n: times for n, cells in texts.items() if (times := times_of(cells)) is not None}
-        log = replace(log, columns={**log.columns, **written, **dated})
-        numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
-        dates = tuple(n for n, c in log.columns.items() if c.dtype.kind in "mM")
-        stamp = find_time(numbers, dates, log.units, vocabulary)
-        repeats = Repeats()
-        if stamp is not None:
-            columns, repeats = merged(log.columns, stamp[0])
-            log = Stamps(stamp.name, stamp.unit).corrected(replace(log, columns=columns))
-        instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])
-        since_1970 = stamp is not None and (
-            stamp[0] in dates
-            or any(abs(float(x)) * factor_to(stamp[1], "s") > SINCE_1970 for x in log.columns[stamp[0]][:1])
-        )
-        return cls(log.columns, log.units, stamp, instants, {}, since_1970, whole, repeats)
-
-    def clock_of(self, name: str) -> Floats | None:
-        """The instants of a column; None of the time column, which has no rate or noise of its own."""
-        own = self.stamp is not None and name == self.stamp[0]
-        return self.clocks.get(name, None if own else self.base)
-
-    def numbers(self) -> dict[str, Floats]:
-        """The numeric columns but time."""
-        own = None if self.stamp is None or self.clocks else self.stamp[0]
-        kept = {n: c for n, c in self.columns.items() if c.dtype.kind in "fiub" and n != own}
-        return {n: c.astype(np.float64, copy=False) for n, c in kept.items()}
-
-    def proposals(self, vocabulary: Vocabulary, vehicle: Vehicle | None = None) -> Proposals:
-        """What each channel may be made of, by a vocabulary, and by the radii of a vehicle."""
-        numbers = self.numbers()
-        clocks = {name: clock for name in numbers if (clock := self.clock_of(name)) is not None}
-        return propose(numbers, self.texts(), self.units, clocks, vocabulary, vehicle)
-
-    def profile_text(
-        self, proposals: Proposals, dbc: Sequence[str | os.PathLike[str]] = (), file: str = "a log"
-    ) -> str:
-        """The profile of proposals, YAML."""
-        return profile_text(file, self.stamp, proposals, since_1970=self.since_1970, dbc=dbc)
-
-    def profile(self, proposals: Proposals) -> Profile:
-        """That profile, loaded; raises InputError where it is none."""
-        return Profile.from_dict(yaml.safe_load(self.profile_text(proposals)))
-
-    def texts(self) -> dict[str, npt.NDArray[Any]]:
-        """The text columns."""
-        return {n: c for n, c in self.columns.items() if c.dtype.kind == "O"}
-
-
-def _size(path: str | os.PathLike[str]) -> int:
-    """Bytes of a log that is a file or a folder; 0 where there is none, for the reader to name."""
-    try:
-        if os.path.isdir(path):
-            return sum(entry.stat().st_size for entry in os.scandir(path) if entry.is_file())
-        return os.path.getsize(path)
-    except OSError:
-        return 0
-
-
 def _unfit(recording: Recording, vehicle: Vehicle) -> str:
     """Why a recording cannot be estimated with a vehicle; empty if it can."""
     try:
@@ -327,14 +221,6 @@ def _as_table(recording: Recording, table: LogTable | SignalLog) -> LogTable:
     columns = {TIME: recording.time, **recording.channels, **recording.labels}
     units = {name: unit for name in columns if (unit := unit_of(name)) is not None}
     return LogTable(tuple(columns), columns, units, table.source, table.sha256)
-
-
-def _seconds(column: npt.NDArray[Any], unit: str) -> Floats:
-    if column.dtype.kind in "mM":
-        return np.asarray((column - column[0]) / np.timedelta64(1, "s"), dtype=np.float64)
-    if column.dtype.kind in "iu" and len(column):
-        column = column.astype(np.int64) - np.int64(column[0])
-    return np.asarray(column, dtype=np.float64) * factor_to(unit, "s")
 
 
 def _time_summary(name: str, unit: str, time: Floats, whole: bool, repeats: Repeats) -> TimeSummary | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.inspect import Seen, read_whole_or_thinned
+from terragrip.formats.seen import Seen, read_whole_or_thinned
 
 WIDTH = 80
 """Stretches that a column is cut into."""
