@@ -37,9 +37,9 @@ void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *dri
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const tg_hold *const torque = &e->torque[i];
         const tg_real square = row->chatter[i], arm = s->machine.radius[i] * drive->load[i];
-        const tg_real gross = e->belief.x[i] + s->machine.tire_rolling_resistance, lever = s->lateral_share[i] / s->wheel_share[i];
+        const tg_real gross = e->belief.x[i] + s->machine.tire_rolling_resistance;
         e->scene.doubt[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (arm * e->wheel[i].interval)) : 0;
-        e->scene.sides[i] = tgi_square(gross) * (tgi_square(lever) * lateral + (e->shared[i] == TG_SAME ? tgi_square(TG_LOCKING) : 0));
+        e->scene.sides[i] = tgi_square(gross) * (e->constants.lean[i] * lateral + (e->shared[i] == TG_SAME ? tgi_square(TG_LOCKING) : 0));
         if (!(torque->spike > 0)) continue;
         const tg_real leap = torque->spike / tgi_square(arm), real = tgi_exp(-leap / (4 * tgi_square(s->prior_adhesion_std)));
         e->scene.doubt[i] += leap * real * torque->interval / (s->tuned.increment_memory + torque->interval);

@@ -225,6 +225,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real mounting_walk;          /* rad^2/s */
     tg_real pace;                   /* s, the unit of time of the watch, see digging.c */
     int32_t watched[8], side[8];    /* wheel: powered, or no wheel is; by its place on its axle -1 left, 1 right, 0 middle */
+    tg_real lean[8];                /* wheel: square of the share of its load that a lateral specific force of 1 m/s^2 moves */
     int32_t twin[8];                /* wheel: another driven one of its axle; itself where there is none */
     int32_t holds;                  /* some channel is held */
     int32_t warps, slopes;          /* driven wheels beyond their trends, see warp.c; trends besides the mean, or 0 where hidden.c does not look */

@@ -226,7 +226,7 @@ static int has_channel(const tg_settings *s, int32_t slot)
     return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
 }
 
-/* Which wheels the watch looks at, on which side of the machine they are, and which other one drives on the same axle. */
+/* Which wheels the watch looks at; on which side of the machine each is, how much it bears there, and which other one drives on its axle. */
 static void place_wheels(const tg_settings *s, tgi_constants *c)
 {
     int32_t any = 0;
@@ -234,6 +234,7 @@ static void place_wheels(const tg_settings *s, tgi_constants *c)
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         int32_t place = 0;
         c->twin[i] = i;
+        c->lean[i] = tgi_square(s->lateral_share[i] / s->wheel_share[i]);
         for (int32_t j = 0; j < s->machine.wheels; j++) {
             if (s->wheel_axle[j] != s->wheel_axle[i]) continue;
             place += (j < i) - (j > i);
