@@ -606,7 +606,7 @@ def test_a_name_that_occurs_twice_is_in_the_way_of_that_column_alone(
     rows = "".join(f"{k / 10},{k % 7},{k % 5},{k % 3},{k % 2}\n" for k in range(100))
     path = put(tmp_path, "t [s],Speed,v [m/s],Speed,w [rad/s]\n" + rows)
     if long:
-        looking = sys.modules["terragrip.formats.inspect"]
+        looking = sys.modules["terragrip.formats.seen"]
         monkeypatch.setattr(looking, "_LONG", 0)
         monkeypatch.setattr(looking, "_ENOUGH", 500)
     report = inspect(path)

@@ -298,7 +298,7 @@ def test_a_long_log_is_looked_at_in_parts(tmp_path: Path, monkeypatch: pytest.Mo
         frame = drive_of_a_robot(30_000)
         frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
     whole = inspect(path)
-    module = sys.modules["terragrip.formats.inspect"]
+    module = sys.modules["terragrip.formats.seen"]
     size = path.stat().st_size
     monkeypatch.setattr(module, "_LONG", size // 2)
     monkeypatch.setattr(module, "_ENOUGH", size / 4)
