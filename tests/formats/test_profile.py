@@ -514,10 +514,23 @@ def test_units_behind_the_names_of_a_table_in_memory_count_as_in_a_file(foreign:
     ):
         np.testing.assert_allclose(result["ground_speed"], foreign["kmh"] / 3.6)
         np.testing.assert_allclose(result["wheel_speed_fl"], foreign["rpm_left"] * np.pi / 30)
-    profile = Profile.from_dict(
-        {"channels": {"ground_speed": "ground_speed [km/h]", "wheel_speed_fl": {"constant": 1.0}}}
-    )
-    np.testing.assert_allclose(read(log, profile)["ground_speed"], foreign["kmh"])  # as the profile says
+
+
+@pytest.mark.parametrize("kind", ["frame", "csv", "parquet"])
+@pytest.mark.parametrize("name", ["Speed (km/h)", "Speed"])
+@pytest.mark.parametrize("unit", [{}, {"unit": "km/h"}])
+def test_a_profile_names_a_column_with_its_unit_or_without(
+    tmp_path: Path, foreign: pd.DataFrame, kind: str, name: str, unit: dict[str, str]
+) -> None:
+    """Parquet and frames took 'Speed (km/h)' for m/s without a word, and refused the names that the same table had as CSV."""
+    log: Any = foreign.rename(columns={"kmh": "Speed (km/h)", "rpm_left": "n (rpm)", "stamp": "t [s]"})
+    if kind != "frame":
+        getattr(log, f"to_{kind}")(tmp_path / f"log.{kind}", index=False)
+        log = tmp_path / f"log.{kind}"
+    channels = {"ground_speed": {"from": name, **unit}, "wheel_speed_fl": {"from": ["n (rpm)", "n"]}}
+    got = read(log, Profile.from_dict({"time": {"from": "t [s]"}, "channels": channels}))
+    np.testing.assert_allclose(got["ground_speed"], foreign["kmh"] / 3.6)
+    np.testing.assert_allclose(got["wheel_speed_fl"], foreign["rpm_left"] * np.pi / 30)
 
 
 def test_a_log_without_time_says_where_to_name_it(foreign: pd.DataFrame) -> None:

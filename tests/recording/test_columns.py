@@ -12,7 +12,8 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.recording.checks import how_to_pivot, place
-from terragrip.recording.columns import columns_of, numbers, seconds, start_of, texts
+from terragrip.recording.columns import numbers, seconds, start_of, texts
+from terragrip.recording.frames import columns_of
 
 
 class Named:

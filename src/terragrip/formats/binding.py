@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terragrip.document import Part
 from terragrip.errors import InputError, nearest
 from terragrip.formats.machines import of_one_machine
 from terragrip.formats.profile_parts import MADE_OF, Source, TimeSource, matching
 from terragrip.formats.table import LogTable
 from terragrip.recording.checks import how_to_pivot
+from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import TIME, rim_names
 from terragrip.units import UnitError, factor_to
 
@@ -28,6 +30,7 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     Of several candidates the first with a value counts. Raises InputError at the first column that the log lacks,
     and names the nearest one; an optional channel is left out instead, and of a ``partial`` log any.
     """
+    profile = _as_spelt(profile, log)
     log, notes = _of_one_machine(profile, log)
     absent: list[str] = []
     channels: dict[str, Source] = {}
@@ -71,6 +74,24 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             raise _missing(rows.column, log)
         rows = None
     return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
+
+
+def _as_spelt(profile: Profile, log: LogTable) -> Profile:
+    """The profile with the log's names, which are without units: ``Speed (km/h)`` is the column Speed of which the log states km/h."""
+    names = {}
+    for whole in profile.sources - log.columns.keys():
+        (bare,), units = names_and_units([whole])
+        if bare in log.columns and log.units.get(bare) == units.get(bare):
+            names[whole] = bare
+
+    def spelt(value: Any) -> Any:
+        if isinstance(value, Part):
+            return value.model_copy(update={k: spelt(getattr(value, k)) for k in value.model_fields_set})
+        if isinstance(value, dict):
+            return {spelt(key): spelt(own) for key, own in value.items()}
+        return tuple(map(spelt, value)) if isinstance(value, tuple) else names.get(value, value)
+
+    return spelt(profile) if names else profile
 
 
 def _of_other_axes(speed: Source | None, log: LogTable) -> list[str]:

@@ -31,13 +31,13 @@ from terragrip.recording.columns import (
     DAY,
     SINCE_1970,
     SPREADSHEET_1970,
-    columns_of,
     numbers,
     seconds,
     stamps_of,
     start_of,
     texts,
 )
+from terragrip.recording.frames import frame_of
 from terragrip.recording.repeats import merged
 from terragrip.recording.schema import LABELS, TIME, unit_of
 from terragrip.units import UnitError, factor_to, quantity
@@ -64,8 +64,8 @@ class Part:
 def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
     """The recording that ``profile`` makes of ``log`` (see `Profile.apply`)."""
     if not isinstance(log, LogTable):
-        columns = columns_of(log, source)
-        log = LogTable(tuple(columns), columns, source=source)
+        table = frame_of(log, source)
+        log = LogTable(tuple(table.columns), table.columns, table.units, source, notes=table.notes)
     part = converted(profile, log)
     frame = {TIME: part.time, **part.columns}
     recording = Recording.from_frame(

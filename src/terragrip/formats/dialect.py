@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import islice, zip_longest
 
 from terragrip.errors import InputError
+from terragrip.recording.frames import WITH_UNIT, names_and_units
 from terragrip.text import HEAD
 from terragrip.thousands import has_thousands, unit_in
 from terragrip.units import is_common
@@ -20,7 +21,6 @@ _LONGEST_PREAMBLE = 30  # lines
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$")
 _NAME = re.compile(r"[^\W\d]|[/\[]")
 _EMPTY = ("", "nan", "na", "n/a", "null", "none", "-", "--", "---", "inf", "-inf")
-_WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _under_groups(groups: list[str], lines: list[str], separator: str, decimal: 
         if not own
     ):
         return None
-    alone = [_WITH_UNIT.sub(r"\1", name) for name in names]
+    alone = [WITH_UNIT.sub(r"\1", name) for name in names]
     whole, group = [], ""
     for own, name, bare, after in zip(groups, names, alone, [*groups[1:], "end"], strict=True):
         group = own or group
@@ -224,34 +224,6 @@ def _is_units_row(cells: list[str], below: list[str], decimal: str) -> bool:
 def _bare(cell: str) -> str:
     cell = cell.strip("[]() ")
     return "" if cell in ("-", "--", "none") else cell
-
-
-def names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Column names without ``[unit]`` or ``(unit)`` behind them, where what stands there is a unit.
-
-    A number or a letter is none where a column of the same name has another one that is no unit: ``speed[1]`` beside ``speed[0]``,
-    ``torque (L)`` beside ``torque (R)``.
-    """
-    bare: list[tuple[str, str]] = []
-    labels = set()
-    for cell in header:
-        match = _WITH_UNIT.match(cell)
-        name, unit = (match[1], match[2] or match[3] or "") if match else (cell, "")
-        if unit and not is_common(unit):
-            labels.add((name, _shape(unit)))
-            name, unit = cell, ""
-        bare.append((name, unit))
-    bare = [
-        (cell, "") if len(unit) == 1 and (name, _shape(unit)) in labels else (name, unit)
-        for cell, (name, unit) in zip(header, bare, strict=True)
-    ]
-    names = [name for name, _ in bare]
-    chosen = [cell if names.count(name) > 1 else name for cell, name in zip(header, names, strict=True)]
-    return tuple(chosen), {c: u for c, (_, u) in zip(chosen, bare, strict=True) if u}
-
-
-def _shape(label: str) -> str:
-    return "number" if label.isdigit() else "letter" if len(label) == 1 and label.isalpha() else "text"
 
 
 def _lines(data: bytes, start: int = 0) -> Iterator[tuple[int, int, bytes]]:

@@ -141,7 +141,7 @@ def _checked(
     ``names``: all columns of the log, ``chosen``: those in the blocks. Raises InputError as that does, each when its block is reached;
     that a channel is empty over the whole file shows at the end only.
     """
-    checks.require_columns(names, log.source)
+    checks.require_columns(names, log.source, log.units)
     notes = list(checks.remarks(names))
     silent, first, after = set(chosen), 0, None
     origin: np.datetime64 | None = None

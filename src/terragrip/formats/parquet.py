@@ -11,6 +11,7 @@ from terragrip.files import refuse_missing
 from terragrip.formats.registry import Format
 from terragrip.formats.table import from_arrow
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
+from terragrip.recording.frames import names_and_units, units_of_fields
 from terragrip.recording.survey import ROWS
 
 if TYPE_CHECKING:
@@ -29,24 +30,30 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     with _opened(path) as file:
         # Not `Schema.empty_table`: it wakes pandas.
         fields = tuple(_flat(pa.Table.from_batches([], file.schema_arrow)).schema)
-        named = [str(field.name) for field in fields]
+        whole = [str(field.name) for field in fields]
+        stated = units_of_fields(file.schema_arrow)
         count = int(file.metadata.num_rows)
-        unreadable = tuple(field.name for field in fields if not _is_readable(field))
+        named, behind = names_and_units(whole)
+        spelt = dict(zip(named, whole, strict=True))
+        units = {name: unit for name in named if (unit := behind.get(name) or stated.get(spelt[name]))}
+        unreadable = tuple(name for name, field in zip(named, fields, strict=True) if not _is_readable(field))
 
     def blocks(chosen: list[str], every: int) -> Iterator[Columns]:
         with _opened(path) as file:
-            batches = file.iter_batches(batch_size=ROWS if every <= 1 else _BLOCK, columns=chosen)
+            batches = file.iter_batches(
+                batch_size=ROWS if every <= 1 else _BLOCK, columns=[spelt[n] for n in chosen]
+            )
             number = 0
             while (batch := _guarded(path, lambda: next(batches, None))) is not None:
                 if number % every == 0:
                     table = _flat(pa.Table.from_batches([batch]))
-                    yield {name: from_arrow(name, table.column(name), path) for name in chosen}
+                    yield {name: from_arrow(name, table.column(spelt[name]), path) for name in chosen}
                 number += 1
 
     names = tuple(dict.fromkeys(named))
     twice = tuple(name for name in names if named.count(name) > 1)
     is_long = os.path.getsize(path) >= _LONG
-    return TableOnDisk(names, {}, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
+    return TableOnDisk(names, units, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
 
 
 def _flat(table: pa.Table) -> pa.Table:

@@ -39,6 +39,7 @@ from terragrip.formats.conversion import convert
 from terragrip.formats.payload import Payload
 from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, one_or_several, rate_unit
 from terragrip.recording import Recording
+from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import (
     AXLE_CHANNELS,
     CHANNELS,
@@ -131,11 +132,12 @@ class Profile(Part):
 
     @cached_property
     def sources(self) -> frozenset[str]:
-        """All columns of the log that the profile may read, as it names them."""
+        """All columns of the log that the profile may read, as it names them and without units behind the names."""
         named = {
             column for one in self.channels.values() for source in one.chain for column in source.columns
         }
-        return frozenset({self.time.column, *named, *([self.rows.column] if self.rows else [])})
+        named |= {self.time.column, *([self.rows.column] if self.rows else [])}
+        return frozenset(named | {bare for name in named for bare in names_and_units([name])[0]})
 
     def apply(self, log: Any, source: str | None = None) -> Recording:
         """Turn a log (a `LogTable`, a DataFrame or a mapping of columns) into a Recording.

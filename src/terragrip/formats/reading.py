@@ -12,7 +12,6 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.files import sha256, unreadable
 from terragrip.formats.conversion import Part, converted
-from terragrip.formats.dialect import names_and_units
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.registry import Databases, format_of
 from terragrip.formats.signals import SignalLog
@@ -20,7 +19,8 @@ from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import EVERY, LogTable, Wanted, in_si
 from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
-from terragrip.recording.columns import columns_of, seconds, start_of
+from terragrip.recording.columns import seconds, start_of
+from terragrip.recording.frames import frame_of
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
@@ -57,9 +57,9 @@ def read(
 
         paths: list[Any] = list(path) if hasattr(path, "__iter__") else [path]
         chosen_ones = _each(profile, paths)
-        for number, (one, own) in enumerate(zip(paths, chosen_ones, strict=True), 1):
+        for number, one in enumerate(paths, 1):
             if _is_table(one):
-                paths[number - 1] = _in_memory(one, own, f"table {number}")
+                paths[number - 1] = _in_memory(one, f"table {number}")
             elif not isinstance(one, str | os.PathLike):
                 raise InputError(
                     f"{type(one).__name__} is no log", hint="give a path, a DataFrame or a dict of arrays"
@@ -83,14 +83,12 @@ def _of_frame(frame: Any, profile: Any) -> Recording:
     if isinstance(profile, list | tuple):
         raise InputError("there are several profiles for one table", hint="give one profile")
     chosen = loaded(profile)
-    return recording_of(_in_memory(frame, chosen), chosen)
+    return recording_of(_in_memory(frame), chosen)
 
 
-def _in_memory(frame: Any, profile: Profile | None, source: str | None = None) -> LogTable:
-    """A table by its columns' names; without a profile, which may name them whole, units behind them are taken as such."""
-    columns = columns_of(frame, source)
-    names, units = (tuple(columns), {}) if profile is not None else names_and_units(list(columns))
-    return LogTable(names, dict(zip(names, columns.values(), strict=True)), units, source)
+def _in_memory(table: Any, source: str | None = None) -> LogTable:
+    frame = frame_of(table, source)
+    return LogTable(tuple(frame.columns), frame.columns, frame.units, source, notes=frame.notes)
 
 
 def recording_of(table: LogTable, profile: Profile | None) -> Recording:
@@ -215,7 +213,7 @@ def _timed(table: LogTable) -> LogTable:
 
 def _require(table: LogTable) -> None:
     try:
-        checks.require_columns(table.names, table.source)
+        checks.require_columns(table.names, table.source, table.units)
     except InputError as error:
         if not table.clocked:
             raise

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.errors import InputError
-from terragrip.recording.schema import unit_of
-from terragrip.units import UnitError, factor_to
+from terragrip.recording import frames
 
 Wanted = Callable[[str], bool]
 """Whether a column, or a signal, is wanted."""
@@ -74,20 +73,7 @@ class LogTable:
 
 def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
     """The columns, in the schema's units where the file states its own; raises InputError where it states another quantity."""
-    columns = dict(table.columns)
-    for name, unit in table.units.items():
-        target = unit_of(name)
-        if target is None or name not in columns or columns[name].dtype.kind not in "fiu":
-            continue
-        try:
-            factor = factor_to(unit, target)
-        except UnitError as error:
-            raise InputError(
-                error.problem, file=table.source, place=f"column {name}", hint=error.hint
-            ) from error
-        if factor != 1.0:
-            columns[name] = columns[name] * np.float64(factor)
-    return columns
+    return frames.in_si(table.columns, table.units, table.source)
 
 
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:

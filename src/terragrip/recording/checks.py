@@ -12,7 +12,8 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError, nearest
 from terragrip.recording.clock import clock_unit
 from terragrip.recording.ranks import median
-from terragrip.recording.schema import LABELS, TIME, is_channel
+from terragrip.recording.schema import LABELS, TIME, is_channel, unit_of
+from terragrip.units import UnitError, factor_to, is_common
 
 if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
@@ -77,8 +78,13 @@ def place(column: str, row: int, time: Floats | None = None, *, first_row: int =
     return f"{where} (time {time[row]:.10g} s)"
 
 
-def require_columns(columns: Collection[str], source: str | None) -> None:
-    """Raise InputError unless time, ground_speed and a wheel speed are among the columns, and they are not those of estimates."""
+def require_columns(
+    columns: Collection[str], source: str | None, units: Mapping[str, str] | None = None
+) -> None:
+    """Raise InputError unless time, ground_speed and a wheel speed are among the columns, and they are not those of estimates.
+
+    ``units``: those that the table states, which a column that is to be renamed should keep.
+    """
     if not columns:
         raise InputError("there are no columns", file=source, hint="give a table with a header")
     refuse_estimates(columns, source)
@@ -94,13 +100,24 @@ def require_columns(columns: Collection[str], source: str | None) -> None:
         raise InputError("is a long table, with a row for each value", file=source, hint=pivot)
     # Name first the missing column that resembles one in the table.
     name = next((n for n in missing if near[n]), missing[0])
-    hint = f"the nearest column is {near[name]!r}: rename it, or map it in a profile"
+    unit = (units or {}).get(near[name] or "") or unit_behind(near[name] or "", name)
+    new = f" '{name} [{unit}]'" if unit else ""
+    hint = f"the nearest column is {near[name]!r}: rename it{new}, or map it in a profile"
     if near[name] is None:
         hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
         if name == TIME and source is None:
             hint = "name the table's column or index of seconds 'time'"
     page = "formats#in-a-profile"
     raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
+
+
+def unit_behind(column: str, channel: str) -> str | None:
+    """The unit of a column such as ``speed_kmh`` that stands for a channel, None where its last word is none of the channel's."""
+    word, target = column.rpartition("_")[2], unit_of(channel)
+    try:
+        return word if is_common(word) and target and factor_to(word, target) else None
+    except UnitError:
+        return None
 
 
 def refuse_estimates(columns: Collection[str], source: str | None) -> None:

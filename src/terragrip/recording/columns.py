@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import datetime as dt
 from typing import Any
 
 import numpy as np
@@ -14,44 +14,6 @@ from terragrip.recording.checks import place
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
 from terragrip.written_times import FORMS, doubt, misfit, times_of
-
-
-def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
-    """The columns of a pandas or polars frame, an Arrow table or a mapping, by name.
-
-    Raises InputError on anything else, on a name that occurs twice and on columns of unlike length.
-    """
-    package = type(frame).__module__.partition(".")[0]
-    pairs: list[tuple[Any, Any]]
-    if isinstance(frame, Mapping):
-        pairs = list(frame.items())
-    elif package == "pandas" and hasattr(frame, "columns"):
-        index = frame.index
-        if TIME not in frame.columns and index.nlevels == 1 and index.dtype.kind in "mM":
-            frame = frame.rename_axis(TIME)
-        if TIME not in frame.columns and TIME in frame.index.names:
-            frame = frame.reset_index(level=TIME)
-        pairs = [(name, _from_pandas(series)) for name, series in frame.items()]
-    elif package == "polars" and hasattr(frame, "get_columns"):
-        pairs = [(series.name, series.to_numpy()) for series in frame.get_columns()]
-    elif package == "pyarrow" and hasattr(frame, "column_names"):
-        pairs = [(name, frame.column(k).to_numpy()) for k, name in enumerate(frame.column_names)]
-    else:
-        raise InputError(
-            f"{type(frame).__name__} is not a table",
-            file=source,
-            hint="give what tg.read(path) returns, a DataFrame or a dict of arrays",
-        )
-    columns: dict[str, npt.NDArray[Any]] = {}
-    for name, values in pairs:
-        if str(name) in columns:
-            raise InputError("occurs twice", file=source, place=f"column {name}", hint="keep one of them")
-        column = _array(str(name), values, source)
-        if columns and len(column) != len(next(iter(columns.values()))):
-            problem = f"has {len(column)} rows, the first column {len(next(iter(columns.values())))}"
-            raise InputError(problem, file=source, place=f"column {name}", hint="give columns of one length")
-        columns[str(name)] = column
-    return columns
 
 
 def numbers(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> Floats:
@@ -117,7 +79,10 @@ def stamps_of(
     """
     if column.dtype.kind not in "OUT":
         return column
-    cells = [cell if isinstance(cell, str) else None for cell in column.tolist()]
+    cells = [
+        cell if isinstance(cell, str) else cell.isoformat() if isinstance(cell, dt.date | dt.time) else None
+        for cell in column.tolist()
+    ]
     times = times_of(cells, order)
     if times is not None:
         return times
@@ -165,30 +130,6 @@ def label_of(value: Any) -> str:
     # test for pandas' NA first: it is neither equal nor unequal to anything
     missing = value is None or type(value).__name__ == "NAType" or value != value
     return "" if missing else str(value).strip()
-
-
-def _from_pandas(series: Any) -> Any:
-    if getattr(series.dtype, "tz", None) is not None:
-        series = series.dt.tz_convert("UTC").dt.tz_localize(None)
-    return series.to_numpy()
-
-
-def _array(name: str, values: Any, source: str | None) -> npt.NDArray[Any]:
-    try:
-        array = (
-            np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
-        )
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"is not a column ({error})",
-            file=source,
-            place=f"column {name}",
-            hint="give a 1-D array of numbers",
-        ) from error
-    if array.ndim != 1:
-        problem = f"has {array.ndim} dimensions"
-        raise InputError(problem, file=source, place=f"column {name}", hint="give a 1-D array of numbers")
-    return array
 
 
 def _refuse_thousands(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> None:

@@ -14,7 +14,8 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError, nearest, suggestion
 from terragrip.recording import checks
 from terragrip.recording.clock import LATEST, clock_index
-from terragrip.recording.columns import columns_of, numbers, seconds, stamps_of, start_of, texts
+from terragrip.recording.columns import numbers, seconds, stamps_of, start_of, texts
+from terragrip.recording.frames import frame_of, in_si
 from terragrip.recording.schema import (
     LABELS,
     REFERENCE,
@@ -65,18 +66,21 @@ class Recording:
         noise: Mapping[str, float] | None = None,
         start: float | None = None,
     ) -> Self:
-        """Convert a pandas or polars frame, an Arrow table or a mapping of arrays; float64 is not copied.
+        """Convert a pandas or polars frame, an Arrow table, an xarray Dataset or a mapping of arrays; SI in float64 is not copied.
+
+        Units as `frame_of` finds them are converted.
 
         Raises InputError with column and row on a missing required column (time, ground_speed, a wheel
         speed), text or infinities in a channel, a required channel without any value, time that is NaN,
         repeats or decreases, and on an empty table. ``source`` is the file that errors name. Without ``start``, it follows from
         dates and stamps since 1970.
         """
-        columns = columns_of(frame, source)
-        checks.require_columns(columns, source)
+        table = frame_of(frame, source)
+        checks.require_columns(table.columns, source, table.units)
+        columns = in_si(table.columns, table.units, source)
         columns = {**columns, TIME: stamps_of(columns[TIME], source)}
         result, remark = cls.of_block(columns, source)
-        remarks = [*notes, *remark, *checks.remarks(columns)]
+        remarks = [*notes, *table.notes, *remark, *checks.remarks(columns)]
         if start is None:
             start = start_of(columns[TIME], result.time)
         channels = {}
@@ -207,7 +211,11 @@ class Recording:
                 axles = ", ".join(vehicle.axle_names)
                 raise self._unfit(name, f"the vehicle has no axle {owner}", f"its axles are {axles}")
             if quantity not in ("", "vertical_load") and owner not in vehicle.wheels:
-                raise self._unfit(name, f"the vehicle has no wheel {owner}", f"its wheels are {known}")
+                unit, wheel = checks.unit_behind(name, name), owner.rpartition("_")[0]
+                hint = f"its wheels are {known}"
+                if unit and wheel in vehicle.wheels:
+                    hint = f"write a unit in brackets: '{quantity}_{wheel} [{unit}]'"
+                raise self._unfit(name, f"the vehicle has no wheel {owner}", hint)
         for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
             if wheel not in self.wheels:
                 evidence = (

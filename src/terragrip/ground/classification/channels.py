@@ -13,7 +13,8 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.recording import Recording, fresh_samples
 from terragrip.recording.checks import check_time, place, refuse_infinite
-from terragrip.recording.columns import columns_of, numbers, seconds
+from terragrip.recording.columns import numbers, seconds
+from terragrip.recording.frames import frame_of, in_si
 from terragrip.recording.held import held_period
 from terragrip.recording.schema import TIME
 
@@ -157,7 +158,8 @@ def _table(recording: Any, index: int) -> Columns:
         for column, values in used.items():
             _refuse_absurd(column, values, recording.time, name)
         return Columns(recording.time, used, recording.source or name)
-    columns = columns_of(recording, name)
+    frame = frame_of(recording, name)
+    columns = in_si(frame.columns, frame.units, name)
     if TIME not in columns:
         raise InputError("is missing", file=name, place=f"column {TIME}", hint="add the instants in seconds")
     time, _ = seconds(columns[TIME], name)

@@ -1,0 +1,115 @@
+"""Tables in memory: the units that they state, and what pandas, polars, Arrow, xarray and pint hold them in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import UTC, timedelta
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pint
+import polars as pl
+import pyarrow as pa
+import pytest
+
+from terragrip.errors import InputError
+from terragrip.recording import Recording
+
+KMH = np.array([3.6, np.nan, 7.2])
+LOG = pd.DataFrame({"time": [0.0, 0.1, 0.2], "ground_speed": KMH, "wheel_speed_l": [5.0, 6.0, 7.0]})
+
+
+def behind(speed: Any) -> pd.DataFrame:
+    return LOG.assign(ground_speed=speed).rename(columns={"ground_speed": "ground_speed [km/h]"})
+
+
+def beside() -> pd.DataFrame:
+    result = LOG.copy()
+    result.attrs["units"] = {"ground_speed": "km/h", "time": "s"}
+    return result
+
+
+class Variable(np.ndarray[Any, Any]):
+    """What xarray's DataArray has of a unit."""
+
+    attrs: Mapping[str, str] = {"units": "km/h"}
+
+
+def quantities() -> dict[str, Any]:
+    speed = pint.application_registry.Quantity(KMH, "km/h")
+    return {"time": LOG["time"], "ground_speed": speed, "wheel_speed_l": LOG["wheel_speed_l"]}
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        behind(KMH),
+        behind(pd.array([3.6, None, 7.2], dtype="Float64")),
+        behind(pd.array([3.6, None, 7.2], dtype="float64[pyarrow]")),
+        behind(pd.Series([3.6, None, 7.2], dtype=object)),
+        behind(["3.6", "", "7.2"]),
+        behind(KMH.astype(np.float32)),
+        pl.from_pandas(behind(KMH)),
+        pa.Table.from_pandas(behind(KMH)),
+        beside(),
+        pa.Table.from_pandas(beside()),
+        {**LOG, "ground_speed": KMH.view(Variable)},
+        quantities(),
+    ],
+)
+def test_a_unit_that_a_table_in_memory_states_is_converted(table: Any) -> None:
+    """Units behind names were refused, those in attrs, of quantities and of cells that are objects dropped without a word."""
+    got = Recording.from_frame(table)
+    np.testing.assert_allclose(got["ground_speed"], KMH / 3.6, rtol=1e-6)
+
+
+def test_a_unit_behind_a_name_counts_before_one_that_attrs_kept() -> None:
+    log = LOG.assign(ground_speed=1.0).rename(columns={"ground_speed": "ground_speed [km/h]"})
+    log.attrs["units"] = {"ground_speed": "m/s", "ground_speed [km/h]": "m/s"}
+    np.testing.assert_allclose(Recording.from_frame(log)["ground_speed"], 1 / 3.6)
+
+
+def test_a_unit_of_another_quantity_is_refused() -> None:
+    log = LOG.copy()
+    log.attrs["units"] = {"ground_speed": "N"}
+    with pytest.raises(
+        InputError, match="column ground_speed: 'N' measures a force, where a speed is needed"
+    ):
+        Recording.from_frame(log)
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        (
+            {"ground_speed": "ground_speed_kmh"},
+            r"'ground_speed_kmh': rename it 'ground_speed \[kmh\]', or map",
+        ),
+        ({"ground_speed": "Speed (km/h)"}, r"'Speed': rename it 'ground_speed \[km/h\]', or map"),
+    ],
+)
+def test_who_is_told_to_rename_a_column_keeps_its_unit(columns: dict[str, str], expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        Recording.from_frame(LOG.rename(columns=columns))
+
+
+def test_an_index_of_several_levels_gives_time_and_label() -> None:
+    """The label was lost without a word."""
+    log = LOG.assign(soil="grass", time=1e3 * LOG["time"]).rename(columns={"time": "time [ms]"})
+    got = Recording.from_frame(log.set_index(["soil", "time [ms]"]))
+    np.testing.assert_allclose(got.time, LOG["time"])
+    assert set(got["soil"]) == {"grass"}
+
+
+def test_names_of_several_levels_are_refused_with_the_way_out() -> None:
+    with pytest.raises(InputError, match=r"names of several levels; choose one, frame\['robot'\]"):
+        Recording.from_frame(pd.concat({"robot": LOG}, axis=1))
+
+
+@pytest.mark.parametrize("of", [lambda stamp: stamp, lambda stamp: stamp.time()])
+def test_cells_that_are_datetimes_or_times_of_day_are_times(of: Callable[[Any], Any]) -> None:
+    first = pd.Timestamp("2026-05-11 08:00:59.95", tz=UTC).to_pydatetime()
+    cells = pd.Series([of(first + timedelta(seconds=t)) for t in LOG["time"]], dtype=object)
+    got = Recording.from_frame(LOG.assign(time=cells)).time
+    np.testing.assert_allclose(got - got[0], LOG["time"], atol=1e-9)
