@@ -105,12 +105,16 @@ def _stated(folder: Path) -> list[str]:
 def _collect(file: Path, wanted: Wanted, topics: dict[str, Topic], types: Types, notes: list[str]) -> None:
     """Read the messages of one SQLite file into their topics."""
     # A recorder that was killed leaves its last messages in a file beside it, which a base that cannot change would not have.
-    journal = file.with_name(f"{file.name}-wal")
-    mode = "ro" if journal.is_file() and journal.stat().st_size else "ro&immutable=1"
+    journal, index = (file.with_name(file.name + end) for end in ("-wal", "-shm"))
+    mode = "ro&immutable=1"
+    if journal.is_file() and journal.stat().st_size:
+        mode = "ro" if index.is_file() else "ro&vfs=unix-none"  # without locks: nobody has the base open
     with (
         as_far_as_it_goes(file, "ROS 2 bag", notes, sqlite3.Error) as seen,
         closing(sqlite3.connect(f"{file.absolute().as_uri()}?mode={mode}", uri=True)) as base,
     ):
+        if mode.endswith("none"):  # the index in memory: the folder may be one that cannot be written
+            base.execute("PRAGMA locking_mode = EXCLUSIVE")
         base.execute("PRAGMA writable_schema = ON")  # else one that was cut off is refused as a whole
         known = _topics_of(base, wanted, topics, types)
         # Asked of each row before its message is looked at: images of which nothing is wanted are not even read.
