@@ -265,6 +265,8 @@ def test_a_unit_of_turns_or_radians_is_left_open(tmp_path: Path, unit: str) -> N
     assert {"wheel_speed_l", "wheel_speed_r"} <= seen.proposals.keys()
     with pytest.raises(InputError, match=f"column wheel_speed_l: '{unit}' is ambiguous"):
         read(log)
+    log.write_text(f"time,ground_speed,spin <{unit}>,n\ns,m/s,,rpm\n" + rows)
+    assert "spin" not in str(inspect(log).proposals)  # was a traceback
 
 
 def test_a_torque_in_pound_feet_and_a_pull_in_kilograms_are_proposed(tmp_path: Path) -> None:

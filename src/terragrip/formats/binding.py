@@ -32,48 +32,42 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
     """
     profile = _as_spelt(profile, log)
     log, notes = _of_one_machine(profile, log)
-    absent: list[str] = []
     channels: dict[str, Source] = {}
     for name, origin in profile.channels.items():
-        result = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
-        silent = (
-            log.clocked and result is not None and not all(_holds(log, column) for column in result.columns)
-        )
-        if silent and not (origin.optional or partial):
-            assert result is not None
-            problem = 'has no value: it was sent as "not available" or "error" throughout'
-            hint = "name another source in the profile, or join a log that has it (--with)"
-            raise InputError(problem, file=log.source, place=f"signal {', '.join(result.columns)}", hint=hint)
-        if result is not None and not silent:
-            channels[name] = result
-            if len(origin.chain) > 1 or any("*" in c for c in origin.columns) or len(origin.candidates) > 1:
-                notes.append(f"{name} is from {', '.join(result.columns)}.")
-        elif origin.optional or partial:
-            absent.append(name)
-        else:
-            every = [column for source in origin.chain for column in source.columns]
-            lacking = next((c for c in every if not matching(c, log.columns)), every[0])
-            several = len(origin.chain) > 1 or len(origin.candidates) > 1
-            raise _missing(lacking, log, several_for=name if several else None)
+        source = _chosen(name, origin, log, may_lack=origin.optional or partial)
+        if source is not None:
+            channels[name] = source
+            if len(origin.chain) > 1 or len(origin.candidates) > 1 or any("*" in c for c in origin.columns):
+                notes.append(f"{name} is from {', '.join(source.columns)}.")
     notes += _of_other_axes(channels.get("ground_speed"), log)
+    absent = [name for name in profile.channels if name not in channels]
     if absent and not partial:
         notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")
-    time, rows = profile.time, profile.rows
-    if time.column not in log.columns:
-        if not log.clocked:
-            raise _missing(time.column, log)
-        if TIME not in log.columns:
-            hint = "name some under 'channels:' ('terragrip inspect' shows them)"
-            raise InputError("the profile reads none of its signals", file=log.source, hint=hint)
-        time = time.model_copy(update={"column": TIME, "unit": "s"})
-    elif (stated := log.units.get(time.column)) is not None and stated != time.unit:
-        time, remarks = _in_its_unit(time, stated)
-        notes += remarks
+    time, remarks = _clock(profile.time, log)
+    rows = profile.rows
     if rows is not None and rows.column not in log.columns:
         if not partial:
             raise _missing(rows.column, log)
         rows = None
-    return profile.model_copy(update={"channels": channels, "time": time, "rows": rows}), notes
+    update = {"channels": channels, "time": time, "rows": rows}
+    return profile.model_copy(update=update), notes + remarks
+
+
+def _chosen(name: str, origin: Source, log: LogTable, *, may_lack: bool) -> Source | None:
+    """The first source of a channel that the log has; None where there is none, or on a bus none with a value, if it may lack one."""
+    result = next((own for source in origin.chain if (own := _bound(source, log)) is not None), None)
+    if result is not None and (not log.clocked or all(_holds(log, column) for column in result.columns)):
+        return result
+    if may_lack:
+        return None
+    if result is not None:
+        problem = 'has no value: it was sent as "not available" or "error" throughout'
+        hint = "name another source in the profile, or join a log that has it (--with)"
+        raise InputError(problem, file=log.source, place=f"signal {', '.join(result.columns)}", hint=hint)
+    every = [column for source in origin.chain for column in source.columns]
+    lacking = next((c for c in every if not matching(c, log.columns)), every[0])
+    several = len(origin.chain) > 1 or len(origin.candidates) > 1
+    raise _missing(lacking, log, several_for=name if several else None)
 
 
 def _as_spelt(profile: Profile, log: LogTable) -> Profile:
@@ -98,9 +92,10 @@ def _of_other_axes(speed: Source | None, log: LogTable) -> list[str]:
     """A sentence where the ground speed is one component of a velocity that has a large one beside it: then it is no forward speed."""
     forward = "" if speed is None or not isinstance(speed.column, str) else speed.column
     beside = re.sub(r"\.linear\.x$", ".linear.y", forward)
-    if beside == forward or not {forward, beside} <= log.columns.keys():
+    held = [log.columns[c] for c in (forward, beside) if c in log.columns]
+    if beside == forward or [values.dtype.kind in "fiu" for values in held] != [True, True]:
         return []
-    along, across = (float(np.sqrt(np.nansum(np.square(log.columns[c])))) for c in (forward, beside))
+    along, across = (float(np.sqrt(np.nansum(np.square(values)))) for values in held)
     if across <= _SIDEWAYS * along:
         return []
     return [
@@ -121,8 +116,19 @@ def _of_one_machine(profile: Profile, log: LogTable) -> tuple[LogTable, list[str
     return replace(log, columns={c: log.columns[c] for c in kept}), notes
 
 
-def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:
-    """The time column with the unit that the log itself states, unless the profile gives another, which a note then says."""
+def _clock(time: TimeSource, log: LogTable) -> tuple[TimeSource, list[str]]:
+    """The time column with the unit that the log itself states, unless the profile gives another, which a note then says.
+
+    Signals that have clocks of their own are in seconds under our name.
+    """
+    if time.column not in log.columns:
+        if not log.clocked:
+            raise _missing(time.column, log)
+        if TIME not in log.columns:
+            hint = "name some under 'channels:' ('terragrip inspect' shows them)"
+            raise InputError("the profile reads none of its signals", file=log.source, hint=hint)
+        return time.model_copy(update={"column": TIME, "unit": "s"}), []
+    stated = log.units.get(time.column, time.unit)
     try:
         same = factor_to(stated, "s") == factor_to(time.unit, "s")
     except UnitError:  # no unit of time: a remark of the logger
@@ -135,35 +141,25 @@ def _in_its_unit(time: TimeSource, stated: str) -> tuple[TimeSource, list[str]]:
 
 def _bound(origin: Source, log: LogTable) -> Source | None:
     """A source with existing columns for its names; None if the log lacks one, or has several alternatives without a value."""
-    update: dict[str, object] = {}
-    if origin.candidates:
-        result = [column for name in origin.candidates for column in matching(name, log.columns)]
-        if not result:
-            return None
-        held = next((column for column in result if _holds(log, column)), None)
-        if held is None and origin.otherwise is not None:
-            return None
-        update["column"] = held or result[0]
-    for key in MADE_OF:
-        names = getattr(origin, key)
-        if names is not None:
-            columns = [next(iter(matching(name, log.columns)), None) for name in names]
-            if None in columns or (
-                origin.otherwise is not None and not all(_holds(log, str(c)) for c in columns)
-            ):
-                return None
-            update[key] = tuple(columns)
-            if key == "sum_of":
-                if len(set(columns)) < len(columns):
-                    twice = next(c for c in columns if columns.count(c) > 1)
-                    raise InputError(
-                        f"names the column {twice} twice",
-                        place="sum_of",
-                        hint="give each column a name of its own",
-                    )
-                update[key] = dict(zip(columns, names.values(), strict=True))
-    bound_one = origin.model_copy(update=update)
-    return bound_one if all(column in log.columns for column in bound_one.columns) else None
+    if origin.constant is not None:
+        return origin
+    key = next((key for key in MADE_OF if getattr(origin, key) is not None), "column")
+    if key == "column":
+        found = [column for name in origin.candidates for column in matching(name, log.columns)]
+        columns = [next((column for column in found if _holds(log, column)), next(iter(found), ""))]
+    else:
+        columns = [next(iter(matching(name, log.columns)), "") for name in getattr(origin, key)]
+    if "" in columns or (origin.otherwise is not None and not all(_holds(log, c) for c in columns)):
+        return None
+    made_of: object = columns[0] if key == "column" else tuple(columns)
+    if origin.sum_of is not None:
+        twice = next((c for c in columns if columns.count(c) > 1), None)
+        if twice is not None:
+            hint = "give each column a name of its own"
+            raise InputError(f"names the column {twice} twice", place="sum_of", hint=hint)
+        made_of = dict(zip(columns, origin.sum_of.values(), strict=True))
+    result = origin.model_copy(update={key: made_of})
+    return result if all(column in log.columns for column in result.columns) else None
 
 
 def _holds(log: LogTable, column: str) -> bool:

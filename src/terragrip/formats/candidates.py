@@ -58,7 +58,8 @@ _WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "ic
 """Odometry by these does not look at the wheels; the profile ros2-4wd takes it for ground speed, too."""
 _SLOPES = frozenset({"slope", "incline", "inclination", "steigung", "pente", "pendiente", "pendenza"})
 _FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
-Hint = tuple[str, float, str]  # a Candidate's
+_ALONG = {"longitudinal": "x", "lateral": "y", "vertical": "z"}
+_ABOUT = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 def columns_of(
@@ -69,43 +70,38 @@ def columns_of(
     alike, several = _numbered(numbers), _of_several(numbers)
     result = {}
     for column in numbers:
-        name = vocabulary.read(column)
-        index = re.search(r"(\d+)$", column)
-        if index is not None:  # name0 = wheel_left_joint says of velocity0 which it is
-            unit_word = next(
-                (
-                    t
-                    for c, t in constants.items()
-                    if c.endswith(f"name{index[1]}") and _root(c) == _root(column)
-                ),
-                None,
-            )
-            if unit_word is not None:
-                other = vocabulary.read(unit_word)
-                name = replace(name, concepts=name.concepts | other.concepts, wheel=other.wheel)
-        if {"twist", "pose"} & set(name.words) and _root(column) in odometry:
-            name = replace(name, concepts=name.concepts | {"odometry"})
+        name, stated = vocabulary.read(column), units.get(column)
+        joint = _joint_of(column, constants)
+        concepts = {*name.concepts, *vocabulary.read(joint).concepts}
+        wheel = vocabulary.read(joint).wheel if joint else name.wheel
+        if {"twist", "pose"}.intersection(name.words) and _root(column) in odometry:
+            concepts.add("odometry")
         if is_channel(column) or {"drive", "joint"} <= set(name.words):  # behind the gear
-            name = replace(name, concepts=name.concepts - {"motor"})
-        if _WITHOUT_WHEELS & set(name.words) and not _FUSED & set(name.words):
-            name = replace(name, concepts=name.concepts - {"odometry"})
-        if (
-            name.wheel.isdigit()
-            and column not in alike
-            and (name.has("current") or not name.has("wheel", "motor", "torque"))
-        ):
-            name = replace(name, wheel="")
-        elif name.wheel[:1].isdigit() and not name.wheel.isdigit() and column not in alike:
-            name = replace(name, wheel=name.wheel[1:])  # the number counts no axles
-        stated = units.get(column)
-        open_ = stated is not None and (_MISSPELT.fullmatch(stated) or may_be_turns(stated))
-        readable = None if open_ else stated  # the sizes tell
+            concepts.discard("motor")
+        if _WITHOUT_WHEELS.intersection(name.words) and not _FUSED.intersection(name.words):
+            concepts.discard("odometry")
+        of_one = "current" in concepts or not concepts & {"wheel", "motor", "torque"}
+        if column not in alike and (of_one or not wheel.isdigit()):
+            wheel = wheel.lstrip("0123456789")  # the number counts no wheels and no axles
+        readable = _read(stated)
         if readable and name.unit and kind_of(readable) != kind_of(name.unit):
-            # As in ... Rad [km/h].
-            name = replace(name, concepts=name.concepts | vocabulary.concepts_of(name.words[-1]))
-        unit = readable or name.unit or _unit_of_ros(column)
+            concepts |= vocabulary.concepts_of(name.words[-1])  # as in ... Rad [km/h]
+        unit = readable or _read(name.unit) or _unit_of_ros(column)
+        name = replace(name, concepts=frozenset(concepts), wheel=wheel)
         result[column] = Column(column, name, unit, kind_of(unit), stated, column in several)
     return result
+
+
+def _joint_of(column: str, constants: Mapping[str, str]) -> str:
+    """The joint whose value a numbered column is, empty if none: name0 = wheel_left_joint says of velocity0 which it is."""
+    number = re.search(r"\d+$", column)
+    names = (c for c in constants if number and c.endswith(f"name{number[0]}") and _root(c) == _root(column))
+    return constants.get(next(names, ""), "")
+
+
+def _read(unit: str | None) -> str | None:
+    """A unit, None where it is misspelt or may be of turns or radians: then the sizes tell."""
+    return None if unit is None or _MISSPELT.fullmatch(unit) or may_be_turns(unit) else unit
 
 
 def kind_of(unit: str | None) -> str | None:
@@ -145,113 +141,89 @@ def candidates_of(column: Column) -> list[Candidate]:
     for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
         result = ways(column)
         if result:
-            return [Candidate(*hint) for hint in result if column.kind is None or _fits(column.kind, hint[0])]
+            return [one for one in result if column.kind is None or _fits(column.kind, one.channel)]
     return []
 
 
-def _of_wheels(column: Column) -> list[Hint]:
-    name = column.name
-    if (
-        not name.wheel
-        or name.axis
-        or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate")
-    ):
+def _first(*rules: tuple[object, str, float, str]) -> list[Candidate]:
+    """The candidate of the first rule that holds: whether it does, the channel, its score, and why."""
+    return [Candidate(channel, score, why) for holds, channel, score, why in rules if holds][:1]
+
+
+def _of_wheels(column: Column) -> list[Candidate]:
+    name, wheel, of_wheel = column.name, column.name.wheel, column.name.has("wheel")
+    if not wheel or name.axis or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate"):
         return []
-    if name.has("torque") or column.kind == "torque":
-        return [(f"drive_torque_{name.wheel}", 0.9 if name.has("wheel") else 0.8, "a torque and a wheel")]
-    if name.has("current") or column.kind == "current":
-        return [(f"drive_torque_{name.wheel}", 0.75, "a current and a wheel")]
     turning = (
         name.has("speed", "rotation")
         or (name.has("wheel", "motor") and column.kind in ("speed", "rotation"))
-        or (name.wheel[-1] in "lr" and column.kind == "rotation" and _in_turns(column.unit))  # WS_FL [rpm]
+        or (wheel[-1] in "lr" and column.kind == "rotation" and _in_turns(column.unit))  # WS_FL [rpm]
+    ) and not (name.has("body") and wheel.isdigit())
+    torque, speed, score = f"drive_torque_{wheel}", f"wheel_speed_{wheel}", 0.9 if of_wheel else 0.8
+    return _first(
+        (name.has("torque") or column.kind == "torque", torque, score, "a torque and a wheel"),
+        (name.has("current") or column.kind == "current", torque, 0.75, "a current and a wheel"),
+        (turning and name.has("motor"), speed, 0.9 if of_wheel else 0.65, "a speed and a motor"),
+        (turning, speed, score, "a speed and a wheel"),
     )
-    if not turning or (name.has("body") and name.wheel.isdigit()):
-        return []
-    score = 0.9 if name.has("wheel") else 0.65 if name.has("motor") else 0.8
-    what = "a motor" if name.has("motor") else "a wheel"
-    return [(f"wheel_speed_{name.wheel}", score, f"a speed and {what}")]
 
 
-def _of_motion(column: Column) -> list[Hint]:
+def _of_motion(column: Column) -> list[Candidate]:
     name = column.name
-    axis = name.axis or next(
-        (a for a, c in (("x", "longitudinal"), ("y", "lateral"), ("z", "vertical")) if name.has(c)), ""
-    )
-    about = next((a for a, c in (("x", "roll"), ("y", "pitch"), ("z", "yaw")) if name.has(c)), "")
+    axis = name.axis or next((a for c, a in _ALONG.items() if name.has(c)), "")
+    about = next((a for c, a in _ABOUT.items() if name.has(c)), "")
     if name.has("acceleration"):
-        if name.has("gyro", "rate", "rotation") or about or name.has("position", "east", "north"):
+        if about or name.has("gyro", "rate", "rotation", "position", "east", "north"):
             return []
-        if axis:
-            return [(f"acceleration_{axis}", 0.8 if name.axis else 0.6, "an acceleration and an axis")]
-        return [("acceleration_x", 0.4, "an acceleration, along an unknown axis")]
-    if name.has("rate") and about and not axis:
-        return [(f"angular_velocity_{about}", 0.85, "the rate of an angle")]
-    of_wheels = name.has("odometry")
-    angular = name.has("gyro") or (name.has("rate") and (name.has("speed") or "twist" in name.words))
-    if angular and axis:
-        if of_wheels:
-            return [(f"angular_velocity_{axis}", 0.6, "odometry's rate of turn and an axis")]
-        return [(f"angular_velocity_{axis}", 0.85, "a gyro and an axis")]
-    if axis and name.has("rate") and not name.has("position"):
-        return [(f"angular_velocity_{axis}", 0.7, "a rate and an axis")]
-    if name.has("rate") and "turn" in name.words:
-        return [("angular_velocity_z", 0.55, "a rate of turn")]
-    if axis and column.kind == "rotation" and not name.has("wheel", "motor") and not name.wheel:
-        return [(f"angular_velocity_{axis}", 0.6, "turns about an axis")]
-    if axis and column.kind == "acceleration":
-        return [(f"acceleration_{axis}", 0.6, "an acceleration by its unit, and an axis")]
-    if (
-        column.kind == "rotation"
-        and not name.has("wheel", "motor")
-        and not name.wheel
-        and not _in_turns(column.unit)
-        and not column.one_of_several  # more likely a wheel
-    ):
-        return [("angular_velocity_z", 0.3, "turns, of an unknown part")]
-    if name.has("pitch", "roll") and not name.has("rate", "speed", "rotation", "yaw", "position", "lateral"):
-        slope = bool(_SLOPES & set(name.words))
-        if slope and name.axis:
-            return []  # inclination_x: along it, or about it
-        return [
-            (
-                "pitch" if name.has("pitch") else "roll",
-                0.7 if slope else 0.85,
-                "a slope" if slope else "its name",
-            )
-        ]
-    return []
+        return _first(
+            (axis, f"acceleration_{axis}", 0.8 if name.axis else 0.6, "an acceleration and an axis"),
+            (True, "acceleration_x", 0.4, "an acceleration, along an unknown axis"),
+        )
+    rate, gyro = name.has("rate"), f"angular_velocity_{axis}"
+    angular = axis and (name.has("gyro") or (rate and (name.has("speed") or "twist" in name.words)))
+    turns = column.kind == "rotation" and not name.wheel and not name.has("wheel", "motor")
+    by_unit = column.kind == "acceleration"
+    alone = turns and not column.one_of_several and not _in_turns(column.unit)  # no wheel, no shaft
+    slope = not _SLOPES.isdisjoint(name.words)
+    angle = not name.has("rate", "speed", "rotation", "yaw", "position", "lateral")
+    angle &= not (slope and name.axis)  # inclination_x: along it, or about it
+    by_angle = (0.7, "a slope") if slope else (0.85, "its name")
+    return _first(
+        (rate and about and not axis, f"angular_velocity_{about}", 0.85, "the rate of an angle"),
+        (angular and name.has("odometry"), gyro, 0.6, "odometry's rate of turn and an axis"),
+        (angular, gyro, 0.85, "a gyro and an axis"),
+        (axis and rate and not name.has("position"), gyro, 0.7, "a rate and an axis"),
+        (rate and "turn" in name.words, "angular_velocity_z", 0.55, "a rate of turn"),
+        (axis and turns, gyro, 0.6, "turns about an axis"),
+        (axis and by_unit, f"acceleration_{axis}", 0.6, "an acceleration by its unit, and an axis"),
+        (alone, "angular_velocity_z", 0.3, "turns, of an unknown part"),
+        (angle and name.has("pitch"), "pitch", *by_angle),
+        (angle and name.has("roll"), "roll", *by_angle),
+    )
 
 
-def _of_place(column: Column) -> list[Hint]:
-    name = column.name
+def _of_place(column: Column) -> list[Candidate]:
+    name, words, is_force = column.name, set(column.name.words), column.kind == "force"
     if name.has("speed", "acceleration", "rate"):
         return []
-    for channel in ("latitude", "longitude"):
-        if name.has(channel):
-            whole = channel in name.words or channel[:3] in name.words
-            return [(channel, 0.85 if whole else 0.75, "its name")]
-    if name.has("altitude") and not name.has("coupling"):
-        return [("altitude", 0.85, "its name")]
-    if name.has("coupling") and name.has("vertical") and (name.has("force") or column.kind == "force"):
-        return [("hitch_load", 0.75, "a vertical force at the hitch")]
-    if name.has("mass") and not (
-        name.strange
-        or _is_compound(name)
-        or name.wheel
-        or name.has("wheel", "front", "rear", "motor", "coupling")
-    ):
-        return [("mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine")]
-    words = set(name.words)
-    # Effort de traction: a force.
-    torque = name.has("torque") and not ("effort" in words and name.has("pull"))
-    if torque or name.has("current", "lateral", "vertical") or name.axis in ("y", "z"):
-        return []
-    if name.has("pull") or (name.has("force") and (name.has("coupling") or "tow" in words)):
-        return [("drawbar_force", 0.85, "a pull")]
-    if ("f" in words or column.kind == "force") and (name.has("coupling") or words & {"tow", "draw"}):
-        return [("drawbar_force", 0.65, "a force at the hitch, by its letter or unit")]
-    return []
+    of_a_part = name.strange or _is_compound(name) or name.wheel
+    mass = name.has("mass") and not (of_a_part or name.has("wheel", "front", "rear", "motor", "coupling"))
+    force, hitch = name.has("force"), name.has("coupling")
+    effort = "effort" in words and name.has("pull")  # effort de traction: a force
+    torque = name.has("torque") and not effort
+    along = not (torque or name.has("current", "lateral", "vertical") or name.axis in ("y", "z"))
+    pull = name.has("pull") or (force and (hitch or "tow" in words))
+    letter = ("f" in words or is_force) and (hitch or words & {"tow", "draw"})
+    load = hitch and name.has("vertical") and (force or is_force)
+    return _first(
+        (name.has("latitude"), "latitude", 0.85 if words & {"latitude", "lat"} else 0.75, "its name"),
+        (name.has("longitude"), "longitude", 0.85 if words & {"longitude", "lon"} else 0.75, "its name"),
+        (name.has("altitude") and not hitch, "altitude", 0.85, "its name"),
+        (load, "hitch_load", 0.75, "a vertical force at the hitch"),
+        (mass, "mass", 0.85 if name.has("body") else 0.6, "a mass, of the whole machine"),
+        (along and pull, "drawbar_force", 0.85, "a pull"),
+        (along and letter, "drawbar_force", 0.65, "a force at the hitch, by its letter or unit"),
+    )
 
 
 _OF_A_PART = re.compile(r"(?!gesamt|fahrzeug|maschine|traktor|schlepper).+(gewicht|masse)")
@@ -262,36 +234,31 @@ def _is_compound(name: Name) -> bool:
     return any(_OF_A_PART.fullmatch(word) for word in name.words)
 
 
-def _of_speed(column: Column) -> list[Hint]:
+def _of_speed(column: Column) -> list[Candidate]:
     name = column.name
     along = "twist" in name.words and "linear" in name.words
     by_unit = name.has("ground") and column.kind == "speed"  # GPS [km/h]
-    if not (name.has("speed") or along or by_unit) or name.wheel:
+    if not (name.has("speed") or along or by_unit) or name.wheel or name.axis in ("y", "z"):
         return []
     if column.one_of_several and not name.has("ground", "odometry", "body"):
         return []
-    if name.axis in ("y", "z") or name.has(
-        "lateral", "vertical", "east", "north", "rate", "rotation", "gyro", "yaw", "heading"
-    ):
+    if name.has("lateral", "vertical", "east", "north", "rate", "rotation", "gyro", "yaw", "heading"):
         return []
     if name.has("pitch", "roll", "acceleration", "position", "motor"):
         return []
-    if name.has("odometry"):
-        if not _FUSED.isdisjoint(name.words):
-            return []  # of more than the wheels
-        return [("wheel_based_speed", 0.8, "odometry, which is computed from the wheels")]
-    if name.has("ground"):
-        return [("ground_speed", 0.85, "a speed over ground")]
-    if name.has("wheel"):
-        score = 0.5 if name.has("front", "rear") else 0.85
-        return [("wheel_based_speed", score, "a speed of the wheels as one")]
-    if along and not name.has("body"):
-        return [("ground_speed", 0.4, "a velocity; wheel odometry is not over ground")]
-    if name.axis == "x" or name.has("longitudinal"):
-        return [("ground_speed", 0.65, "a speed along the vehicle")]
-    return [
-        ("ground_speed", 0.55, "a speed, of an unknown part"),
-        ("wheel_based_speed", 0.35, "a speed, of an unknown part"),
+    if name.has("odometry") and not _FUSED.isdisjoint(name.words):
+        return []  # of more than the wheels
+    along = along and not name.has("body")
+    of_wheels = 0.5 if name.has("front", "rear") else 0.85
+    return _first(
+        (name.has("odometry"), "wheel_based_speed", 0.8, "odometry, which is computed from the wheels"),
+        (name.has("ground"), "ground_speed", 0.85, "a speed over ground"),
+        (name.has("wheel"), "wheel_based_speed", of_wheels, "a speed of the wheels as one"),
+        (along, "ground_speed", 0.4, "a velocity; wheel odometry is not over ground"),
+        (name.axis == "x" or name.has("longitudinal"), "ground_speed", 0.65, "a speed along the vehicle"),
+    ) or [
+        Candidate("ground_speed", 0.55, "a speed, of an unknown part"),
+        Candidate("wheel_based_speed", 0.35, "a speed, of an unknown part"),
     ]
 
 

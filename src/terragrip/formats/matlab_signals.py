@@ -81,47 +81,56 @@ def _is_run(part: Any, first: Any) -> bool:
 def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Any) -> None:
     if _x_and_y(struct, name, contents):
         return
-    lower = {key.lower(): key for key in reversed(list(struct))}  # of names that differ in case, the first
-    clock_name = _clock_name(struct, name, contents)
-    clock = above if clock_name is None else struct[clock_name]
-    others = _other_clocks(struct, clock)
-    if clock is None and len(others) > 1:
-        clock_name = next(iter(others.values()))
-        clock = struct[clock_name]
-    if clock is not None:
-        length = int(np.prod(clock.shape))
-        used = {clock_name, *others.values()}
-        for key in filter(None, used):
-            contents.scales[id(struct[key])] = _SCALES.get(key.rpartition("_")[2].lower(), 1.0)
-        if "signals" in lower and _structure_with_time(
-            struct[lower["signals"]], clock, length, name, contents
-        ):
-            return
-        for key, part in struct.items():
-            if key in used or not _is_numeric(part):
-                continue
-            rows = next((n for n in (length, *others) if n in part.shape), None)
-            if rows is None:
-                if _is_vector(part) and max(part.shape) > length / 2:  # shorter ones are parameters
-                    contents.odd[_joined(name, key)] = max(part.shape), length
-            else:
-                plain = key.lower() in _DATA and name
-                stated = next((lower[word] for word in _UNITS if word in lower), None)
-                unit = struct[stated] if plain and stated is not None else None
-                its = clock if rows == length else struct[others[rows]]
-                _add(contents, name if plain else _joined(name, key), its, part, rows, unit)
+    clocks = _clocks(struct, name, contents, above)
+    if clocks and _structure_with_time(_value(struct, ("signals",)), clocks, name, contents):
+        return
+    clock = next(iter(clocks.values()), None)
+    _add_those_beside(clocks, struct, name, contents)
     for key, part in struct.items():
+        own = _joined(name, key)
         if _is_numeric(part):
             if clock is None:
-                kind = contents.loose if _is_vector(part) else contents.matrices
-                kind[_joined(name, key)] = part
-        elif key.lower() == "values" and isinstance(part, Mapping | Opaque):
-            walk(part, name, contents, depth + 1, clock)  # a Dataset's element: its name is the signal's
-        elif key.lower() in ("elements", "signals") and not isinstance(part, str):
-            own = _own_name(part)  # one element alone is no list
-            walk(part, _joined(name, own) if own else name, contents, depth + 1, clock)
+                (contents.loose if _is_vector(part) else contents.matrices)[own] = part
         elif not isinstance(part, str):
-            walk(part, _joined(name, key), contents, depth + 1, clock)
+            if key.lower() == "values" and isinstance(part, Mapping | Opaque):
+                own = name  # a Dataset's element: its name is the signal's
+            elif key.lower() in ("elements", "signals"):
+                own = _joined(name, _own_name(part))  # one element alone is no list
+            walk(part, own, contents, depth + 1, clock)
+
+
+def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Any) -> dict[int, Any]:
+    """The time vectors of a struct's signals by their length: first its own, or the one ``above``; empty if there is none."""
+    own = _clock_name(struct, name, contents)
+    clock = above if own is None else struct[own]
+    others = _other_clocks(struct, clock)
+    if clock is None and len(others) < 2:
+        return {}
+    for key in filter(None, (own, *others.values())):
+        contents.scales[id(struct[key])] = _SCALES.get(key.rpartition("_")[2].lower(), 1.0)
+    first = {} if clock is None else {int(np.prod(clock.shape)): clock}
+    return first | {length: struct[key] for length, key in others.items()}
+
+
+def _add_those_beside(
+    clocks: Mapping[int, Any], struct: Mapping[str, Any], name: str, contents: Contents
+) -> None:
+    """Add the signals of a struct that have as many instants as one of the clocks (by length, the first before others)."""
+    for key, part in struct.items():
+        if not clocks or not _is_numeric(part) or any(part is clock for clock in clocks.values()):
+            continue
+        first, length = next(iter(clocks)), next((n for n in clocks if n in part.shape), None)
+        if length is not None:
+            plain = key.lower() in _DATA and name
+            unit = _value(struct, _UNITS) if plain else None
+            _add(contents, name if plain else _joined(name, key), clocks[length], part, length, unit)
+        elif _is_vector(part) and max(part.shape) > first / 2:  # shorter ones are parameters
+            contents.odd[_joined(name, key)] = max(part.shape), first
+
+
+def _value(struct: Mapping[str, Any], words: tuple[str, ...]) -> Any:
+    """What a struct holds under the first of some words, whatever their case; None if nothing."""
+    return next((struct[key] for word in words for key in struct if key.lower() == word), None)
 
 
 def _clock_name(struct: Mapping[str, Any], name: str, contents: Contents) -> str | None:
@@ -209,8 +218,9 @@ def _structs(value: Any) -> list[Mapping[str, Any]]:
     return parts if all(isinstance(part, Mapping) for part in parts) else []
 
 
-def _structure_with_time(signals: Any, clock: Any, length: int, name: str, contents: Contents) -> bool:
+def _structure_with_time(signals: Any, clocks: Mapping[int, Any], name: str, contents: Contents) -> bool:
     """Simulink's "structure with time": whether ``signals`` is such a list, whose values were taken."""
+    length, clock = next(iter(clocks.items()))
     is_used = False
     for k, part in enumerate(_structs(signals)):
         if _is_numeric(part.get("values")) and length in part["values"].shape:
@@ -261,7 +271,7 @@ def _own_name(part: Any) -> str:
 
 
 def _joined(name: str, key: str) -> str:
-    return f"{name}.{key}" if name else key
+    return f"{name}.{key}" if name and key else name or key
 
 
 def _is_list(value: Any) -> bool:

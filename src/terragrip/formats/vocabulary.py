@@ -222,38 +222,27 @@ class Vocabulary:
 
     def read(self, name: str) -> Name:
         """Read a column's name."""
-        behind = _BEHIND.search(name)
-        if behind is not None and is_common(behind["unit"]):
-            name = f"{name[: behind.start()]} [{behind['unit']}]"
-        bracket = _BRACKET.search(name)
-        body = name[: bracket.start()] if bracket and bracket.start() > 0 else name
-        if bracket and body.strip() and not (_is_unit(bracket[1]) and not self._is_word(bracket[1])):
-            body = name  # words, not a unit
+        body, stated = self._parted(name)
         words = words_of(body)
-        concepts: set[str] = set()
-        axis = ""
         unit, used = self._unit_at_end(words)
-        if unit is None and bracket and body != name:
-            unit = self._unit_in_bracket(bracket[1])
-        unit = unit or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
-        last = words_of(re.split(r"[./]", body)[-1])  # numbers before it are those of buses and topics
+        unit = unit or stated or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
+        last = words_of(re.split(r"[./]", body)[-1])  # of a struct's field, less the structs it is in
         text = words[: len(words) - used] or words
-        if len(last) < len(words):
-            text = [w for w in text if w not in _OF_MESSAGES or w in last]
-        if text == ["t"]:
-            concepts.add("time")
-        own = text[-2:] if len(last) - used == 2 else []  # of a struct's field, less the structs it is in
-        if own and own[0] in _AXIS_SYMBOLS and own[1] in ("x", "y", "z"):
-            text = [*text[:-2], "".join(own)]  # a_z
+        text = [word for word in text if word not in _OF_MESSAGES or word in last]
+        letter, index = text[-2:] if len(last) - used == 2 else ("", "")
+        concepts = {"time"} if text == ["t"] else set()
+        if letter in _AXIS_SYMBOLS and index in ("x", "y", "z"):
+            text = [*text[:-2], letter + index]  # a_z
+        elif letter in _SYMBOLS and (index in _CORNERS or index in "lr12345678"):
+            concepts.add(_SYMBOLS[letter])  # M1, w_rl, log.n_fl
+            text = [*text[:-2], index]
         if len(words) > 1 and unit in ("rpm", "rev/s"):
             concepts.add("rotation")
-        if own and own[0] in _SYMBOLS and (own[1] in _CORNERS or own[1] in "lr12345678"):
-            concepts.add(_SYMBOLS[own[0]])  # M1, w_rl, log.n_fl
-            text = [*text[:-2], own[1]]
+        axis = ""
         for word in text:
-            short = _SYMBOL_OF_AXIS.match(word)
-            if short is not None and word not in self._known:
-                concepts |= {_AXIS_SYMBOLS[short[1][0]]}
+            short = None if word in self._known else _SYMBOL_OF_AXIS.match(word)
+            if short is not None:
+                concepts.add(_AXIS_SYMBOLS[short[1][0]])
                 axis = short[2]
             elif word in ("x", "y", "z"):
                 axis = word
@@ -269,10 +258,20 @@ class Vocabulary:
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
 
-    def _is_word(self, text: str) -> bool:
-        """Whether a bracket holds a word of the trade (``Speed (GPS)``) and no unit."""
-        plain = text.lower()
-        return len(plain) > 2 and plain in self._known and plain not in UNIT_WORDS and not is_common(text)
+    def _parted(self, name: str) -> tuple[str, str | None]:
+        """A name without the unit or remark at its end, and that unit; a word in brackets is the name's (``Speed (GPS)``)."""
+        behind = _BEHIND.search(name)
+        if behind is not None and is_common(behind["unit"]):
+            name = f"{name[: behind.start()]} [{behind['unit']}]"
+        bracket = _BRACKET.search(name)
+        if bracket is None or not name[: bracket.start()].strip():
+            return name, None
+        text, plain = bracket[1], bracket[1].lower()
+        unit = text if is_common(text) or text == "g" else self.unit_word(plain)
+        is_word = unit is None and len(plain) > 2 and plain in self._known
+        if is_word or not 0 < len(text) <= 10 or re.search(r"\s\w{3,}", text):
+            return name, None
+        return name[: bracket.start()], None if plain == "ms^2" else unit  # m/s^2 misspelt, or not
 
     def _unit_at_end(self, words: list[str]) -> tuple[str | None, int]:
         """The unit that a name ends in, and how many of its words say so; a name is not all unit."""
@@ -289,12 +288,6 @@ class Vocabulary:
         ):
             return unit, 1 if len(words) > 1 else 0
         return None, 0
-
-    def _unit_in_bracket(self, text: str) -> str | None:
-        plain = text.strip()
-        if plain.lower() == "ms^2":
-            return None  # m/s^2 misspelt, or not
-        return plain if is_common(plain) or plain == "g" else self.unit_word(plain.lower())
 
 
 def _is_cut(word: str, bare: bool, full: str, concept: str) -> bool:
@@ -345,10 +338,6 @@ def _without_accents(name: str) -> str:
 
 def _ordinals(name: str) -> str:
     return " ".join(_ORDINAL.sub(r"\1", word) for word in name.split(" "))
-
-
-def _is_unit(text: str) -> bool:
-    return bool(text) and len(text) <= 10 and not re.search(r"\s\w{3,}", text)
 
 
 def _settled(concepts: set[str]) -> frozenset[str]:
