@@ -287,7 +287,8 @@ def test_messages_that_a_killed_recorder_left_beside_the_bag(tmp_path: Path) -> 
     index = killed / f"{file.name}-shm"
     index.unlink()
     left = (killed / f"{file.name}-wal").read_bytes()
-    index.symlink_to(tmp_path / "none" / "none")  # so it cannot be made, as on a disk that is mounted to be read: 'is a damaged ROS 2 bag, or none'
+    index.symlink_to(tmp_path / "none" / "none")
+    # so it cannot be made, as on a disk that is mounted to be read: 'is a damaged ROS 2 bag, or none'
     assert len(read_table(killed).columns["time"]) == COUNT
     assert (killed / f"{file.name}-wal").read_bytes() == left
 
