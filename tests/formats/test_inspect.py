@@ -252,6 +252,15 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
     assert any("nor a drive train's (wheel_based_speed)" in sentence for sentence in inspection.missing)
 
 
+def test_a_unit_that_measures_something_else_is_named(tmp_path: Path, log: pd.DataFrame) -> None:
+    """A pitch in N, a ground speed in A: inspect ended as "a defect of Terragrip"."""
+    wrong = log.assign(pitch=0.1).rename(columns={"pitch": "pitch [N]", "ground_speed": "ground_speed [A]"})
+    wrong.to_csv(tmp_path / "log.csv", index=False)
+    seen = inspect(tmp_path / "log.csv")
+    assert not {"pitch", "ground_speed"} & seen.proposals.keys()
+    assert any("'A' measures a current, where a speed is needed" in warning for warning in seen.warnings)
+
+
 @pytest.mark.parametrize("unit", ["Hz", "1/s"])
 def test_a_unit_of_turns_or_radians_is_left_open(tmp_path: Path, unit: str) -> None:
     """Hz in the row of units of a wheel's speed: read as none, so that the line asks; estimate then says what to write."""

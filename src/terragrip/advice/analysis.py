@@ -293,10 +293,7 @@ def _left_out(light: float, way: float) -> tuple[str, ...]:
 def _burnt(samples: Samples, vehicle: Vehicle) -> dict[str, float]:
     """Litres per hour and per hectare as measured."""
     seconds = samples.metres / np.maximum(np.abs(samples.speed), 1e-3)
-    return burnt(
-        samples.fuel, seconds, samples.metres, vehicle.working_width,
-        ("litres_per_hour", "litres_per_hectare_measured"),
-    )  # fmt: skip
+    return burnt(samples.fuel, seconds, samples.metres, vehicle.working_width)
 
 
 def _field_work(work: Work, vehicle: Vehicle) -> dict[str, float]:

@@ -106,8 +106,6 @@ def draw_curves(
     radius_sd: float,
     offset_sd: float,
     wheel_radius: float,
-    draws: int = DRAWS,
-    seed: int = 0,
 ) -> CurveDraws | None:
     """Curves of one soil; None with fewer than LEAST_STRETCHES stretches or LEAST_BINS bins.
 
@@ -131,8 +129,8 @@ def draw_curves(
 
     way = sums(np.ones_like(samples.metres))
     totals = [sums(x) for x in (samples.slip, samples.adhesion, samples.resistance)]
-    rng = np.random.default_rng(seed)
-    times = rng.multinomial(stretches, np.full(stretches, 1 / stretches), size=draws).astype(float)
+    rng = np.random.default_rng(0)
+    times = rng.multinomial(stretches, np.full(stretches, 1 / stretches), size=DRAWS).astype(float)
     times = np.vstack([np.ones(stretches), times])
     weight = times @ way
     enough = weight > 0.2 * samples.way / bins
@@ -143,7 +141,7 @@ def draw_curves(
     sd = [np.where(enough, x, np.nan) for x in (slip, mu, rho)]
     slip_sd, mu_sd, rho_sd = (spread * _pooled(np.nanstd(x[1:], axis=0)) for x in sd)
     own = BY_BIN * sums(samples.slip_std).sum(axis=0) / way.sum(axis=0)
-    slip[1:] += own * rng.standard_normal((draws, bins))
+    slip[1:] += own * rng.standard_normal((DRAWS, bins))
     slip_sd = np.sqrt(slip_sd**2 + SLIP_FLOOR**2 + own**2)
     prior_sd = SPREAD.copy()
     prior_sd[E] = lasting_sd(radius_sd, float(np.median(samples.slip_std)))
@@ -152,10 +150,10 @@ def draw_curves(
         (np.average(samples.resistance, weights=samples.metres) - YIELDING) / (SOFT - YIELDING), 0, 1
     )
     centre[1] += SLOWER * float(yields) * min(np.log(wheel_radius / NO_SMALLER), 0.0)
-    prior = centre + prior_sd * rng.standard_normal((draws + 1, len(CENTRE)))
+    prior = centre + prior_sd * rng.standard_normal((DRAWS + 1, len(CENTRE)))
     prior[0] = centre
-    scale = 1 + common_sd * rng.standard_normal((draws + 1, 1))
-    shift = offset_sd * rng.standard_normal((draws + 1, 1))
+    scale = 1 + common_sd * rng.standard_normal((DRAWS + 1, 1))
+    shift = offset_sd * rng.standard_normal((DRAWS + 1, 1))
     scale[0], shift[0] = 1.0, 0.0
     mu, rho = mu * scale, rho + shift
     x = _fit(slip, mu, rho, enough, (slip_sd, mu_sd, rho_sd), prior, prior_sd)

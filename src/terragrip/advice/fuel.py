@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from terragrip.arrays import Floats
@@ -32,16 +30,14 @@ def fuel_rate_of(estimates: Estimates) -> Floats:
     return out
 
 
-def burnt(
-    rate: Floats, seconds: Floats, metres: Floats, width: float | None, names: Sequence[str]
-) -> dict[str, float]:
+def burnt(rate: Floats, seconds: Floats, metres: Floats, width: float | None) -> dict[str, float]:
     """Litres per hour of driving, and per hectare with a tool of ``width`` [m], over rows (n,) whose rate [m³/s] is known; empty
-    where it is known for less than `LEAST_KNOWN` of the time. ``names``: of the two figures."""
+    where it is known for less than `LEAST_KNOWN` of the time."""
     known = np.isfinite(rate)
     if not known.any() or seconds[known].sum() < LEAST_KNOWN * seconds.sum():
         return {}
     litres = 1e3 * float(rate[known] @ seconds[known])
-    out = {names[0]: litres / (float(seconds[known].sum()) / 3600)}
+    out = {"litres_per_hour": litres / (float(seconds[known].sum()) / 3600)}
     if width is not None and metres[known].sum() > 0:
-        out[names[1]] = litres / (float(metres[known].sum()) * width / 1e4)
+        out["litres_per_hectare_measured"] = litres / (float(metres[known].sum()) * width / 1e4)
     return out

@@ -89,7 +89,7 @@ class SlipSetpoint:
         self._time, self._step = time, step
         late = not 0 <= step <= max(self.limits.longest_step, usual)
         self._judge(estimates, time, "a gap in time" if late else "")
-        aim = self._aim(estimates, time)
+        aim = self._aim(estimates)
         step = min(max(step, 0.0), self.limits.longest_step)
         most, least = self._rim + self.limits.speed_up * step, self._rim - self.limits.slow_down * step
         self._rim = max(min(max(aim, least), most), 0.0)
@@ -131,7 +131,7 @@ class SlipSetpoint:
             return "measurements contradict each other"
         return ""
 
-    def _aim(self, estimates: Estimated, time: float) -> float:
+    def _aim(self, estimates: Estimated) -> float:
         """The rim speed aimed at [m/s]."""
         crawl = self.limits.crawl * self.speed
         wanted = self.speed / (1 - self.slip)

@@ -70,13 +70,7 @@ def advise_rows(rows: Sequence[Rows], vehicle: Vehicle) -> Advice:
     if vehicle.working_width:
         rate = float(np.average(speed, weights=seconds)) * vehicle.working_width * 0.36
         work = {"hectares_per_hour": rate, "hectares_per_hour_at_band": rate / (1 - lost)}
-    work |= burnt(
-        fuel,
-        seconds,
-        seconds * speed,
-        vehicle.working_width,
-        ("litres_per_hour", "litres_per_hectare_measured"),
-    )
+    work |= burnt(fuel, seconds, seconds * speed, vehicle.working_width)
     cost = (
         f", {work['hectares_per_hour_at_band'] - work['hectares_per_hour']:.2g} ha/h"
         if vehicle.working_width

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,23 +26,19 @@ class FleetCurves:
     tire_resistance: float
 
 
-def learn_curves(
-    store: Store, notes: Sequence[Mapping[str, Any]], progress: Callable[[int, int], None] | None = None
-) -> FleetCurves:
+def learn_curves(store: Store, notes: Sequence[Mapping[str, Any]]) -> FleetCurves:
     """Learn every labelled soil from the samples that the logs left (`LogTally`). Raises InputError if a sample is damaged."""
     sampled = [note for note in notes if note["sample"]]
     by_machine: dict[str, GatheredRuns] = {}
     tires: dict[str, float] = {}
     rows = sum(note["summary"]["moving_time"] for note in sampled) / 0.2
     every = max(1, int(rows // MOST_ROWS) + 1)
-    for number, note in enumerate(sampled, 1):
+    for note in sampled:
         machine = str(note["summary"]["vehicle"])
         estimates = _sample(store, note).select(slice(None, None, every))
         # five rows a second do not resolve roughness: signatures need `terragrip soils`
         by_machine.setdefault(machine, GatheredRuns()).add(estimates, note["log"], signatures=False)
         tires[machine] = float(estimates.vehicle.tire_rolling_resistance or 0.0)
-        if progress:
-            progress(number, len(sampled) + 1)
     every_run = GatheredRuns()
     for gathered in by_machine.values():
         every_run.join(gathered)

@@ -72,16 +72,11 @@ class Agreement:
     def _paths(self, ranked: Mapping[str, list[Guess]]) -> list[Way]:
         """What was driven, in metres: by latitude and longitude, by positions, by a distance."""
         result: list[Way] = []
-        north, east = surest(ranked, "latitude"), surest(ranked, "longitude")
-        if (
-            north is not None
-            and east is not None
-            and north.unit == east.unit
-            and north.unit in ("deg", "rad", E7)
-            and not (north.doubt or east.doubt)
-        ):
-            pair = (north.column.column, east.column.column)
-            factor = factor_to(north.unit, "deg")
+        best = (surest(ranked, "latitude"), surest(ranked, "longitude"))
+        known = [g for g in best if g is not None and g.unit in ("deg", "rad", E7) and not g.doubt]
+        if len(known) == 2 and known[0].unit == known[1].unit:
+            pair = (known[0].column.column, known[1].column.column)
+            factor = factor_to(str(known[0].unit), "deg")
             if (path := self._evidence.displacements(pair, degrees=True, unit=factor)) is not None:
                 result.append((f"{pair[0]}, {pair[1]}", path))
         places = {n: c for n, c in self._columns.items() if c.kind == "length" and c.unit is not None}
@@ -144,28 +139,20 @@ class Agreement:
             g if g.column.column in own else replace(g, confidence=0.4 * g.confidence)
             for g in ranked["ground_speed"]
         ]
-        kept = []
-        for guess in ranked["wheel_based_speed"]:
-            if guess.column.column in own:
-                continue
-            best = max(named, key=lambda g: g.confidence)
-            if guess.column.name.has("wheel", "odometry") or guess.confidence >= 0.9:
-                kept.append(guess)
-                continue
-            result = self._evidence.ratio(best.column.column, guess.column.column)
-            if result is not None and result[1] > 0.5 and 0.6 < result[0] < 1.4:
-                sentence = f"varies with {best.column.column}, of which it is {1 / result[0]:.3g} times"
-                kept.append(
-                    replace(
-                        guess,
-                        confidence=0.6,
-                        evidence=(*guess.evidence, sentence),
-                        doubt="the wheels' own speed, beside one over ground?"
-                        if guess.column.name.strange
-                        else "",
-                    )
-                )
-        ranked["wheel_based_speed"] = kept
+        best = max(named, key=lambda g: g.confidence)
+        others = [g for g in ranked["wheel_based_speed"] if g.column.column not in own]
+        ranked["wheel_based_speed"] = [kept for g in others if (kept := self._own_speed(g, best)) is not None]
+
+    def _own_speed(self, guess: Guess, ground: Guess) -> Guess | None:
+        """A speed beside the one over ground as the vehicle's own; None where neither its name nor its ratio to that one says so."""
+        if guess.column.name.has("wheel", "odometry") or guess.confidence >= 0.9:
+            return guess
+        result = self._evidence.ratio(ground.column.column, guess.column.column)
+        if result is None or not (result[1] > 0.5 and 0.6 < result[0] < 1.4):
+            return None
+        sentence = f"varies with {ground.column.column}, of which it is {1 / result[0]:.3g} times"
+        doubt = "the wheels' own speed, beside one over ground?" if guess.column.name.strange else ""
+        return replace(guess, confidence=0.6, evidence=(*guess.evidence, sentence), doubt=doubt)
 
     def _ground(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
         """The best ground speed and its factor to m/s, where its unit is beyond doubt."""

@@ -120,6 +120,10 @@ def kind_of(unit: str | None) -> str | None:
 
 def candidates_of(column: Column) -> list[Candidate]:
     """The channels that a column may be, by its name and unit."""
+    return [one for one in _by_name(column) if column.kind is None or _fits(column.kind, one.channel)]
+
+
+def _by_name(column: Column) -> list[Candidate]:
     own = column.column
     # A wheel may have any name, but none that ends in a unit or says what is no measurement.
     any_name = split_channel(own) is not None and own not in CHANNELS
@@ -138,11 +142,8 @@ def candidates_of(column: Column) -> list[Candidate]:
         return [Candidate(standard, 0.95, ON_THE_BUS)]
     if column.name.has("command", "statistic", "change", "other"):
         return []
-    for ways in (_of_wheels, _of_motion, _of_place, _of_speed):
-        result = ways(column)
-        if result:
-            return [one for one in result if column.kind is None or _fits(column.kind, one.channel)]
-    return []
+    ways = (_of_wheels, _of_motion, _of_place, _of_speed)
+    return next(filter(None, (way(column) for way in ways)), [])
 
 
 def _first(*rules: tuple[object, str, float, str]) -> list[Candidate]:
@@ -268,11 +269,11 @@ def _fits(kind: str, channel: str) -> bool:
         return kind in ("rotation", "speed")
     if channel.startswith("drive_torque_"):
         return kind in ("torque", "current", "share")
-    if channel == "pitch":
-        return kind in ("angle", "share")  # a grade
+    if channel == "pitch" or unit_of(channel) == "1":
+        return kind in ("angle", "share")  # a grade, a plain number
     if target == "force":
         return kind in ("force", "mass")
-    return kind == target
+    return kind == target or (channel == "mass" and kind == "acceleration")  # in g
 
 
 def unit_on_the_bus(channel: str) -> str | None:

@@ -12,6 +12,7 @@ from terragrip.arrays import Floats
 from terragrip.formats.candidates import Column
 from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.evidence import Evidence
+from terragrip.formats.judgement import varies
 
 
 def add_indirect(
@@ -92,11 +93,6 @@ def velocity_in_the_plane(columns: Mapping[str, Column], evidence: Evidence) -> 
                 if small > 0.3 * great and column.kind in (None, "speed") and column.unit == beside.unit:
                     return name, other
     return ()
-
-
-def varies(values: Floats) -> bool:
-    known = values[np.isfinite(values)]
-    return len(known) > 0 and bool(known.max() > known.min())
 
 
 def _quaternion(names: tuple[str, ...]) -> list[str]:

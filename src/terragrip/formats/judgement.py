@@ -82,22 +82,19 @@ class Judge:
 
     def of(self, column: Column, candidate: Candidate) -> Guess | None:
         """A column as a candidate says, with its unit, judged by its own values; None where they rule it out."""
+        channel, target, own = candidate.channel, unit_of(candidate.channel), candidate.score == 1.0
         values = self._numbers[column.column]
-        known = values[np.isfinite(values)]
-        own = candidate.score == 1.0
-        may_be_constant = own or candidate.channel in _CONSTANTS
-        if not len(known) or (
-            not may_be_constant
-            and len(known) > 2
-            and not known.max() > known.min()
-            and not self._may_stand(candidate, known)
-        ):
+        known, moves = values[np.isfinite(values)], own or channel in _CONSTANTS or varies(values)
+        if not len(known) or not (moves or len(known) < 3 or self._may_stand(candidate, known)):
             return None
-        target = unit_of(candidate.channel)
-        guess = Guess(
-            column, candidate.channel, candidate.score, candidate.why, column.unit, (candidate.why,)
-        )
+        guess = Guess(column, channel, candidate.score, candidate.why, column.unit, (candidate.why,))
         if column.unit is not None:
+            if (
+                target is not None
+                and not own
+                and _too_large(guess, self._evidence.size(column.column), target)
+            ):
+                return None
             surer = candidate.score if own else 1 - 0.7 * (1 - candidate.score)  # it measures the same
             guess = replace(guess, confidence=surer, evidence=(candidate.why, f"in {column.unit}"))
         elif target is not None and (
@@ -106,27 +103,18 @@ class Judge:
             guess = self._sized(guess, target)
         elif own:
             guess = replace(guess, unit=target)
-        if guess.channel.startswith("drive_torque_") and column.name.has("current"):
+        if channel.startswith("drive_torque_") and column.name.has("current"):
             guess = replace(guess, unit_doubt="", unit=column.unit)
-        if (
-            target is not None
-            and column.unit is not None
-            and not own
-            and _too_large(guess, self._evidence.size(column.column), target)
-        ):
-            return None
-        if candidate.channel in ("pitch", "roll") and guess.unit is not None:
-            size = self._evidence.size(column.column) * factor_to(guess.unit, "rad")
-            if size > _STEEP:
-                guess = replace(
-                    guess,
-                    confidence=0.6 * guess.confidence,
-                    doubt=f"reaches {np.degrees(size):.0f} deg: a vehicle's?",
-                )
+        if channel in ("pitch", "roll") and guess.unit is not None:
+            angle = self._evidence.size(column.column) * factor_to(guess.unit, "rad")
+            if angle > _STEEP:
+                doubt = f"reaches {np.degrees(angle):.0f} deg: a vehicle's?"
+                guess = replace(guess, confidence=0.6 * guess.confidence, doubt=doubt)
         if len(known) < 3 and not own:
-            guess = replace(guess, doubt=f"{len(known)} value{'s' * (len(known) > 1)} only")
-        elif not may_be_constant and not known.max() > known.min():
-            guess = replace(guess, confidence=0.6 * guess.confidence, doubt=f"is {known[0]:.4g} throughout")
+            return replace(guess, doubt=f"{len(known)} value{'s' * (len(known) > 1)} only")
+        if not moves:
+            doubt = f"is {known[0]:.4g} throughout"
+            return replace(guess, confidence=0.6 * guess.confidence, doubt=doubt)
         return guess
 
     def _may_stand(self, candidate: Candidate, known: Floats) -> bool:
@@ -137,12 +125,7 @@ class Judge:
             over_ground = column.name.has("speed") and not column.name.has(
                 "wheel", "vertical", "statistic", "command"
             )
-            if (
-                over_ground
-                and column.kind == "speed"
-                and column.unit
-                and np.ptp(_known(self._numbers[name])) > 0
-            ):
+            if over_ground and column.kind == "speed" and column.unit and varies(self._numbers[name]):
                 return self._evidence.size(name) * factor_to(column.unit, "m/s") < _STANDING
         return False
 
@@ -172,9 +155,10 @@ class Judge:
         return replace(guess, unit=target, unit_doubt=f"no unit is stated: {target}?")
 
 
-def _known(values: Floats) -> Floats:
+def varies(values: Floats) -> bool:
+    """Whether two of the values (n,) are known and differ."""
     known = values[np.isfinite(values)]
-    return known if len(known) else np.zeros(1)
+    return len(known) > 0 and bool(known.max() > known.min())
 
 
 def _same(unit: str, other: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -33,51 +32,58 @@ def missing_channels(
     """What is not among the channels that were found, and what follows, as sentences; ``columns`` are the log's."""
     notes = [] if has_time else ["No time column was found: it is needed, in increasing seconds."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
-    if not wheels and "wheel_based_speed" not in proposals:
+    turns = bool(wheels) or "wheel_based_speed" in proposals
+    if not turns:
         notes.append(
             "No wheel speed was found, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
             "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
-        matrices = [name for name in columns if name.endswith("[1]")]
-        fields = [name for name in columns if re.search(r"\[1\]\.", name) and _may_turn(name)]
-        if matrices or fields:
-            several = (
-                *(name.removesuffix("[1]") for name in matrices),
-                *(n.replace("[1]", "[]") for n in fields),
-            )
-            first = next(iter((*matrices, *fields))).replace("[1]", "[0]")
-            notes.append(
-                f"The order in {', '.join(several)} is not known: if they are the wheels', say which is which in a "
-                f"profile, 'wheel_speed_fl: {{from: \"{first}\"}}'."
-            )
+        notes += _without_order(columns)
     if "ground_speed" not in proposals:
         notes.append("No ground speed was found: slip and resistance need it; positions will do.")
-    if not wheels and "wheel_based_speed" not in proposals:
-        return notes  # nothing else matters
+    return [*notes, *_missing_forces(proposals, wheels, vehicle)] if turns else notes
+
+
+def _without_order(columns: Collection[str]) -> list[str]:
+    """A sentence on columns numbered from 0 that may be the wheels' (``speed[0]``, ``motors[0].rpm``): which is which nobody knows."""
+    turning = ("speed", "rotation", "torque", "current")
+    several = [name for name in columns if name.endswith("[1]")]
+    several += [name for name in columns if "[1]." in name and GENERAL.read(name).has(*turning)]
+    if not several:
+        return []
+    named = ", ".join(name.removesuffix("[1]").replace("[1]", "[]") for name in several)
+    first = several[0].replace("[1]", "[0]")
+    return [
+        f"The order in {named} is not known: if they are the wheels', say which is which in a "
+        f"profile, 'wheel_speed_fl: {{from: \"{first}\"}}'."
+    ]
+
+
+def _missing_forces(proposals: Collection[str], wheels: Sequence[str], vehicle: Vehicle | None) -> list[str]:
+    """Sentences on torques, forces and slopes that were not found beside the speeds of ``wheels``, or of the drive train."""
     without = [wheel for wheel in wheels if f"drive_torque_{wheel}" not in proposals]
     if len(without) == len(wheels) and has_engine_torque(proposals):
-        if vehicle is None or vehicle.driveline is None:
-            notes.append(
-                "No wheel's drive torque was found, but the engine's: with a 'driveline' in the vehicle file the adhesion of all driven "
-                "wheels together can be estimated, without it slip alone."
-            )
-        return notes
+        if vehicle is not None and vehicle.driveline is not None:
+            return []
+        return [
+            "No wheel's drive torque was found, but the engine's: with a 'driveline' in the vehicle file the adhesion of all driven "
+            "wheels together can be estimated, without it slip alone."
+        ]
     if len(without) == len(wheels):
-        notes.append(
+        return [
             "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, "
             "soil resistance, net traction, efficiency and soil curves cannot."
-        )
-        return notes
+        ]
     driven = {} if vehicle is None else dict(zip(vehicle.wheels, vehicle.driven, strict=True))
-    notes += [
+    notes = [
         f"No drive torque was found for wheel {wheel}, which the vehicle file says is driven: name its column in a profile."
         if wheel in driven
         else f"No drive torque was found for wheel {wheel}: estimates need it, unless the vehicle file says 'driven: false' for its axle."
         for wheel in without
         if driven.get(wheel, True)
     ]
-    stated = vehicle is not None and vehicle.uncertainty.drawbar_force is not None
-    notes += [NOTHING_TOWED] * ("drawbar_force" not in proposals and not stated)
+    if "drawbar_force" not in proposals and (vehicle is None or vehicle.uncertainty.drawbar_force is None):
+        notes.append(NOTHING_TOWED)
     if "acceleration_x" not in proposals:
         notes.append(
             "No acceleration_x was found: soil resistance is estimated from speed alone, more slowly."
@@ -87,11 +93,6 @@ def missing_channels(
             "No pitch was found: the ground is assumed level, and a slope appears as soil resistance."
         )
     return notes
-
-
-def _may_turn(name: str) -> bool:
-    """Whether a column's name speaks of a speed, a torque or a current."""
-    return GENERAL.read(name).has("speed", "rotation", "torque", "current")
 
 
 def refusal(channels: Collection[str], silent: Sequence[str]) -> str:

@@ -18,8 +18,8 @@ from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle, of_
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal, proposal_of
 from terragrip.formats.evidence import Evidence
-from terragrip.formats.indirect import add_indirect, varies, velocity_in_the_plane
-from terragrip.formats.judgement import Guess, Judge
+from terragrip.formats.indirect import add_indirect, velocity_in_the_plane
+from terragrip.formats.judgement import Guess, Judge, varies
 from terragrip.formats.machines import of_one_machine, twins
 from terragrip.formats.rim_units import own_name
 from terragrip.formats.vocabulary import GENERAL, Vocabulary

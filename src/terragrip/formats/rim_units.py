@@ -11,7 +11,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.formats.evidence import Evidence, Finding, Path
 from terragrip.formats.judgement import Guess
-from terragrip.formats.vocabulary import GENERAL, Vocabulary
+from terragrip.formats.vocabulary import GENERAL
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -84,11 +84,11 @@ class RimUnit:
         return guess.with_finding(Finding(self.unit is not None, sentence, self.unit))
 
 
-def own_name(vehicle: Vehicle | None, wheel: str, vocabulary: Vocabulary = GENERAL) -> str:
+def own_name(vehicle: Vehicle | None, wheel: str) -> str:
     """The name that a vehicle has for a wheel of a corner or side in a log (vl for fl, 1l for l); the log's where it has none such."""
     if vehicle is None or wheel in vehicle.wheels:
         return wheel
-    read = {one: vocabulary.read(f"wheel_speed_{one}").wheel for one in vehicle.wheels}
+    read = {one: GENERAL.read(f"wheel_speed_{one}").wheel for one in vehicle.wheels}
     meant = [one for one, place in read.items() if wheel in (place, place.lstrip("0123456789"))]
     return meant[0] if len(meant) == 1 else wheel
 

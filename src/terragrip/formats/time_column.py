@@ -54,9 +54,7 @@ def find_time(
     return TimeColumn(dates[0], "s") if dates else None
 
 
-def other_clocks(
-    numbers: Mapping[str, Floats], time: str, units: Mapping[str, str], vocabulary: Vocabulary = GENERAL
-) -> list[str]:
+def other_clocks(numbers: Mapping[str, Floats], time: str, units: Mapping[str, str]) -> list[str]:
     """Sentences on further columns of stamps that run forward, but end before those of ``time``: tables of unlike rates, side by side."""
     notes = []
     for column, values in numbers.items():
@@ -64,7 +62,7 @@ def other_clocks(
         count = int(measured.sum())
         if column == time or not 2 < count < len(values) or not measured[:count].all():
             continue
-        if _score(column, values, units.get(column), vocabulary)[0] > 0 and _forward(values[:count]) > 0.9:
+        if _score(column, values, units.get(column), GENERAL)[0] > 0 and _forward(values[:count]) > 0.9:
             notes.append(
                 f"{column} is another clock, of {count} stamps: the columns that belong to it are not of the instants of {time}. Give "
                 f"them a profile of their own with 'time: {{from: {column}}}', and the log once more by --with."

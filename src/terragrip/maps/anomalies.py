@@ -55,14 +55,14 @@ class Anomaly:
     p: float
 
 
-def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly]:
+def anomalies_of(cells: Cells) -> list[Anomaly]:
     """Patches of cells unlike their surroundings, the strongest first.
 
     A cell's residual is its distance beyond the medians of its surroundings on each side. Residuals of neighbours are combined by inverse
     variance; what each constant weighs more in them than around is added to it. The null is the scatter of such scores about the nearest
     of those medians (their 68 % quantile; Efron 2004: most of a field is no anomaly), so soil that varies as it does everywhere is not an
     anomaly, and a field of two soils is not one whose soil varies. Cells beyond it that touch are a patch, which is then judged as a whole
-    by discs of as many cells elsewhere on the map. At most `share` of the cells, and of the listed patches, are due to chance.
+    by discs of as many cells elsewhere on the map. At most `FALSE_DISCOVERIES` of the cells, and of the listed patches, are due to chance.
     """
     from scipy.spatial import cKDTree
     from scipy.special import ndtr
@@ -84,10 +84,10 @@ def anomalies_of(cells: Cells, share: float = FALSE_DISCOVERIES) -> list[Anomaly
     scale = float(np.quantile(np.abs(plain / spread)[known], ONE_SD))
     score = beyond / spread / max(scale, 1.0)
     p = np.where(known, 2 * ndtr(-np.abs(np.nan_to_num(score))), 1.0)
-    patches = _patches(tree, place, significant(p, share), score)
+    patches = _patches(tree, place, significant(p, FALSE_DISCOVERIES), score)
     null = {size: _elsewhere(size, patches, cells, tree, constants) for size in set(map(_size, patches))}
     found = [_anomaly(patch, cells, tree, constants, null[_size(patch)]) for patch in patches]
-    listed = significant(np.array([one.p for one in found]), share, 1)
+    listed = significant(np.array([one.p for one in found]), FALSE_DISCOVERIES, 1)
     return sorted(compress(found, listed), key=lambda one: one.p)
 
 

@@ -45,7 +45,7 @@ def solve(
     cost = ((target - now) ** 2).sum(axis=1)
     damping = np.full(len(x), 1e-3)
     for _ in range(iterations):
-        jacobian = _jacobian(curve, x, now, lower, upper)
+        jacobian = _jacobian(curve, x, now, upper)
         gradient = np.einsum("bkj,bj->bk", jacobian, target - now)
         normal = np.einsum("bkj,blj->bkl", jacobian, jacobian)
         scale = np.maximum(np.einsum("bkk->bk", normal), 1e-12)
@@ -67,7 +67,7 @@ def solve(
     return x, cost
 
 
-def _jacobian(curve, x: Floats, now: Floats, lower: Floats, upper: Floats) -> Floats:  # type: ignore[no-untyped-def]
+def _jacobian(curve, x: Floats, now: Floats, upper: Floats) -> Floats:  # type: ignore[no-untyped-def]
     """Forward differences, backward at an upper bound: (sets, free, bins), bins last because sums run over them."""
     columns = []
     for i in range(x.shape[1]):

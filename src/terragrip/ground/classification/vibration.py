@@ -9,6 +9,7 @@ from terragrip.arrays import Floats
 BANDS = 32  # at most; fewer where a window holds fewer samples
 _SEGMENT = 0.375  # of a window: four overlapping segments average the spectrum's noise out
 _FEWEST = 8  # samples in a segment that is worth a spectrum
+_PARTS = 5  # of a window, whose energies are compared
 
 
 def band_edges(window: float, period: float) -> Floats:
@@ -84,14 +85,14 @@ def spectral_shape(energies: Floats, edges: Floats) -> dict[str, Floats]:
     }
 
 
-def unsteadiness(values: Floats, parts: int = 5) -> Floats:
+def unsteadiness(values: Floats) -> Floats:
     """Spread (windows,) of the log energy over the parts of a window: high on ground that comes in bumps.
 
     ``values`` (windows, axes, samples).
     """
     centred = values - values.mean(axis=-1, keepdims=True)
     energy = (centred**2).sum(axis=1)
-    size = max(energy.shape[-1] // parts, 1)
+    size = max(energy.shape[-1] // _PARTS, 1)
     parts = energy.shape[-1] // size
     blocks = energy[:, : parts * size].reshape(len(energy), parts, size).mean(axis=-1)
     floor = 1e-6 * blocks.mean(axis=-1, keepdims=True) + 1e-300

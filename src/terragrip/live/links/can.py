@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 import sys
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -223,19 +223,13 @@ async def bus_of(uri: Uri) -> AsyncIterator[Any]:
 
 
 def _python_can() -> Any:
-    with _without("asammdf"):
-        import can
-    return can
-
-
-@contextmanager
-def _without(package: str) -> Iterator[None]:
-    """python-can imports asammdf where it is installed, for a log format: 85 MB and 0.6 s that a live bus does not need."""
-    if "can" in sys.modules or package in sys.modules:
-        yield
-        return
-    sys.modules[package] = None  # type: ignore[assignment]  # makes its import fail
+    """python-can, which imports asammdf where it is installed, for a log format: 85 MB and 0.6 s that a live bus does not need."""
+    hidden = not {"can", "asammdf"} & sys.modules.keys()
+    if hidden:
+        sys.modules["asammdf"] = None  # type: ignore[assignment]  # makes its import fail
     try:
-        yield
+        import can
     finally:
-        del sys.modules[package]
+        if hidden:
+            del sys.modules["asammdf"]
+    return can
