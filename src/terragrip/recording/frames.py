@@ -48,7 +48,7 @@ def in_si(
 ) -> dict[str, npt.NDArray[Any]]:
     """The columns, those of the schema in its units; raises InputError where the table states a unit of another quantity."""
     result = dict(columns)
-    for name in units.keys() & columns.keys():
+    for name in [name for name in columns if name in units]:  # in order: an error names the first
         target, column = unit_of(name), columns[name]
         if name == TIME:
             column = stamps_of(column, source)
