@@ -63,6 +63,17 @@ def test_axles_of_unlike_rims_keep_one_ratio_where_radii_are_exchanged(
     assert any("The rims of the axle rear go" in note for note in notes) is said
 
 
+def test_axles_of_a_drive_that_goes_straight_but_slowly_are_not_compared(vehicle: Vehicle) -> None:
+    """Such a drive, a radius off by 1.3, ended as "a defect of Terragrip" (an index out of bounds)."""
+    time = np.arange(0, 200, 0.1)
+    speed = np.where(time < 60, 0.3, 1.5)
+    log = {"time": time, "ground_speed": speed}
+    for wheel in vehicle.wheels:
+        side = np.where(speed > 1, 1.4 if wheel[1] == "r" else 0.6, 1.0)
+        log[f"wheel_speed_{wheel}"] = speed * side / 0.2 * (1.3 if wheel[0] == "r" else 1.0)
+    assert not any("rims of the axle" in note for note in unit_warnings(Recording.from_frame(log), vehicle))
+
+
 @pytest.mark.parametrize("slip", [-0.2, 0.0, 0.1, 0.3, 0.5])
 def test_slip_is_no_wrong_unit(columns: Columns, vehicle: Vehicle, slip: float) -> None:
     notes = unit_warnings(scaled(columns, "wheel_speed", 0.93 / (1 - slip)), vehicle)

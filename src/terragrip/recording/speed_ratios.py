@@ -107,6 +107,8 @@ def _is_one_ratio(recording: Recording, vehicle: Vehicle, fast: str, slow: str, 
         own = [recording.channels[f"wheel_speed_{w}"] for w in vehicle.axles[name].wheels]
         rims.append(np.mean([filled(recording.time, np.abs(values)) for values in own], axis=0))
     moving = rows & (rims[0] > 0.3 * quantile(rims[0], 0.95)) & (rims[1] > 0)
+    if not moving.any():
+        return False
     low, high = (quantile(rims[0][moving] / rims[1][moving], share) for share in (0.25, 0.75))
     return high < _ONE * low
 
