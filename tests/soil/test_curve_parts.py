@@ -78,7 +78,7 @@ def test_differences_are_forward_and_backward_at_an_upper_bound() -> None:
         return x**2
 
     x = np.array([[1.0, 2.0], [3.0, 1e-9]])
-    jacobian = _jacobian(square, x, x**2, np.zeros(2), np.array([3.0, 5.0]))
+    jacobian = _jacobian(square, x, x**2, np.array([3.0, 5.0]))
     np.testing.assert_allclose(jacobian[:, :, 0], [[2.0, 0.0], [6.0, 0.0]], atol=1e-5)
     np.testing.assert_allclose(jacobian[:, :, 1], [[0.0, 4.0], [0.0, 0.0]], atol=1e-5)
     assert calls[0][1, 0] < 3.0  # at the bound
