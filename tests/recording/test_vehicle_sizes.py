@@ -51,3 +51,20 @@ def test_no_right_machine_is_accused() -> None:
         vehicles += [make(name, "torque", {"mass": mass}).vehicle for mass in (2.0, 140.0, 20_000.0)]
     assert len(vehicles) > 20
     assert not [note for vehicle in vehicles for note in size_warnings(vehicle)]
+
+
+def test_a_trailer_among_the_axles_is_named() -> None:
+    """As a third axle it moved what the tractor turns about: the front wheels' slip was -.24 for 0 in turns of 6 m radius, silently."""
+    trailer = {"mass": 4000, "wheels": ["tl", "tr"], "driven": False}
+    front = {**TRACTOR["axles"]["front"], "steered": True}
+    axles = {"front": front, "rear": TRACTOR["axles"]["rear"], "trailer": trailer}
+    (note,) = size_warnings(Vehicle.from_dict({**TRACTOR, "mass": 10_000, "wheelbase": 8.0, "axles": axles}))
+    assert note.startswith(
+        "The vehicle file's axle trailer neither drives nor steers: if it is a trailer's, leave it out"
+    )
+    rigid = {**axles, "front": TRACTOR["axles"]["front"]}
+    six = {**axles, "trailer": {**trailer, "driven": True}}
+    for right in (rigid, six):
+        assert not size_warnings(
+            Vehicle.from_dict({**TRACTOR, "mass": 10_000, "wheelbase": 8.0, "axles": right})
+        )

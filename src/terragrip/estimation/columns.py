@@ -55,7 +55,8 @@ _WHOLE |= {
 _BY_WHEEL = {
     "wheel_speed": Column("rad/s", "angular velocity of wheel {}"),
     "adhesion": Column(
-        "1", "adhesion (mu) of wheel {}: horizontal force of the ground over the wheel's load"
+        "1",
+        "adhesion (mu) of wheel {}: force of the ground along the travel, in reverse too, over the wheel's load",
     ),
     "slip": Column("1", "slip of wheel {}: 1 spins on the spot, -1 is a locked wheel"),
     "net_traction": Column("1", "net traction ratio of wheel {}: adhesion less soil resistance"),

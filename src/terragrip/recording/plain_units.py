@@ -148,10 +148,10 @@ def _typical_size(recording: Recording, name: str) -> float | None:
 
 
 def size_warnings(vehicle: Vehicle | None) -> list[str]:
-    """A sentence on each number of the vehicle file that no machine of its mass and wheels has."""
+    """A sentence on each number of the vehicle file that no machine of its mass and wheels has, and on an axle that may be a trailer's."""
     if vehicle is None:
         return []
-    sizes, notes = _sizes(vehicle), []
+    sizes, notes = _sizes(vehicle), _trailer_warnings(vehicle)
     for key, unit, size, (low, high), likely in _BOUNDS:
         value = reduce(lambda part, name: getattr(part, name, None), key.split("."), vehicle)  # type: ignore[arg-type, return-value]
         if not value or size not in sizes or low <= abs(value) / sizes[size] <= high:  # type: ignore[arg-type]
@@ -165,6 +165,18 @@ def size_warnings(vehicle: Vehicle | None) -> list[str]:
             f"The vehicle file's {key} is {number:g}{suffix}, where a machine of its mass and wheels has {bounds}: {fix}."
         )
     return notes
+
+
+def _trailer_warnings(vehicle: Vehicle) -> list[str]:
+    """A sentence on a last axle of three or more that only rolls along behind a steered one."""
+    last, axles = vehicle.axle_names[-1], tuple(vehicle.axles.values())
+    if len(axles) < 3 or not any(axle.steered for axle in axles) or axles[-1].driven or axles[-1].steered:
+        return []
+    return [
+        f"The vehicle file's axle {last} neither drives nor steers: if it is a trailer's, leave it out, and its wheels' columns too. "
+        "As a part of the vehicle it turns and carries load with it as one rigid body, and the steered wheels' slip in turns and all "
+        "adhesion are wrong."
+    ]
 
 
 def _sizes(vehicle: Vehicle) -> dict[str, float]:
