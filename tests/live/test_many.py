@@ -20,7 +20,6 @@ from terragrip.live import read_record
 from terragrip.live.many import vehicles as many_vehicles
 from terragrip.live.many.roster import Roster
 from terragrip.live.many.service import ManyService
-from terragrip.live.many.vehicles import Limits
 from terragrip.live.options import Options
 from terragrip.live.service import Service
 
@@ -239,9 +238,9 @@ async def test_vehicles_appear_while_it_runs_and_so_do_rows_of_the_table(
 
 
 async def test_there_are_limits(everyone, short, monkeypatch):
-    """On vehicles, on memory, on what one may have waiting, and on what is remembered of those refused."""
+    """On vehicles, on what one may have waiting, and on what is remembered of those refused."""
     good = messages(short.recording, 20)
-    service = ManyService(everyone, [NOWHERE], limits=Limits(2))
+    service = ManyService(everyone, [NOWHERE], most=2)
     async with running(service):
         for name in ("a", "b", "c"):
             put(service, name, *good)
@@ -256,10 +255,6 @@ async def test_there_are_limits(everyone, short, monkeypatch):
         assert len(run.inbox.samples) == many_vehicles.CAPACITY
         await until(lambda: not run.inbox.samples)
         assert run.core.counts.total("dropped") == 3000 - many_vehicles.CAPACITY
-    small = ManyService(everyone, [NOWHERE], limits=Limits(memory=1e6))
-    async with running(small):
-        put(small, "a", *good)
-        assert small.vehicles.refusals["a"].why.endswith("; raise --memory")
 
 
 async def test_a_parked_vehicle_is_predicted_for_a_while_only(everyone, short, monkeypatch):

@@ -88,7 +88,6 @@ async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
         (["--source", "mqtt://h/{vehicle}/s", "--index", "empty.csv"], "empty.csv: names no vehicle"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "lost.csv"], "nowhere.yaml"),
         (["--source", "mqtt://h/{vehicle}/s", "--index", "none.csv"], "no vehicle file for t1; write one in its row"),
-        (["--source", "mqtt://h/{vehicle}/s", "--vehicle", "robot.yaml", "--memory", "much"], "'much' is not an amount"),
         (["--source", "mqtt://h/{vehicle}/s", "--vehicle", "robot.yaml", "--record", "robot.yaml"], "robot.yaml"),
         (["--source", "mqtt://h/s", "--sink", "mqtt://h/{vehicle}", "--vehicle", "robot.yaml"], "not one whole level"),
         (["--source", "mqtt://h/{vehicle}/s", "--vehicle", "robot.yaml", "--method", "magic"], "magic"),

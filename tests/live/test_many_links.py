@@ -103,7 +103,6 @@ async def test_metrics_bear_the_vehicle(listed, short, port):
     assert page[name("vehicles")] == 2
     assert page[name("vehicles_refused")] == 1
     assert page[name("unnamed_messages_total")] == 1
-    assert 2e7 < page[name("memory_bytes")] < 1e10
 
 
 @pytest.mark.asyncio

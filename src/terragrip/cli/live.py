@@ -99,9 +99,6 @@ def command(
     max_vehicles: Annotated[
         int, typer.Option(metavar="COUNT", min=1, help="For many vehicles: the greatest number at once.")
     ] = 256,
-    memory: Annotated[
-        str, typer.Option(metavar="AMOUNT", help="For many vehicles: no new one starts above this memory.")
-    ] = "4GB",
     duration: Annotated[
         float | None, typer.Option(metavar="S", min=0.0, help="Stop after this many seconds.")
     ] = None,
@@ -153,7 +150,7 @@ def command(
             "are those of one machine", place="--settings", hint="put the noise into the vehicle files"
         )
     else:
-        service = _many(source, sink or [], vehicle, profile, index, record, options, (max_vehicles, memory))
+        service = _many(source, sink or [], vehicle, profile, index, record, options, max_vehicles)
         screen = partial(table_of_many, service)
     from terragrip.log_events import emit
 
@@ -196,17 +193,13 @@ def _many(
     index: Path | None,
     record: Path | None,
     options: Options,
-    limits: tuple[int, str],
+    most: int,
 ) -> ManyService:
-    from terragrip.live.many.memory import amount
     from terragrip.live.many.roster import Roster
     from terragrip.live.many.service import ManyService
-    from terragrip.live.many.vehicles import Limits
 
     roster = Roster(vehicle, None if profile is None else Path(profile), index)
-    return ManyService(
-        roster, source, sink, record=record, options=options, limits=Limits(limits[0], amount(limits[1]))
-    )
+    return ManyService(roster, source, sink, record=record, options=options, most=most)
 
 
 def _settings(path: Path | None) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from urllib.parse import unquote
 
 from terragrip.live.many.links import Router
-from terragrip.live.many.memory import held_now
 from terragrip.live.many.vehicles import Vehicles
 from terragrip.live.monitor import Answers, Family, Monitor, add_sinks
 from terragrip.live.outbox import Outbox
@@ -60,7 +59,6 @@ class ManyMonitor(Answers):
             ),
             ("counter", "vehicle_failures_total", "Vehicles closed after a failure.", vehicles.failures),
             ("counter", "unnamed_messages_total", "Messages whose topic names no vehicle.", vehicles.unnamed),
-            ("gauge", "memory_bytes", "Memory of the process.", held_now()),
         ):
             page.add(kind, f"terragrip_live_{family}", text, value)
         listed = vehicles.runs.keys() | unready.keys()

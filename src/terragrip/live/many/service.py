@@ -18,7 +18,7 @@ from terragrip.live.links.studio import StudioSink
 from terragrip.live.many.links import Router, check_sources, open_sinks
 from terragrip.live.many.monitor import ManyMonitor
 from terragrip.live.many.roster import Roster
-from terragrip.live.many.vehicles import Journal, Limits, Vehicles
+from terragrip.live.many.vehicles import MOST_VEHICLES, Journal, Vehicles
 from terragrip.live.message import Message
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
@@ -42,7 +42,7 @@ class ManyService:
     sinks: likewise, or a `studio:`, where a client asks for one vehicle.
     record: folder that holds a record a vehicle, by its name; None: none is kept.
     options: as for one vehicle. ``listeners`` get what is published of every vehicle, and events of the service itself.
-    limits: how many vehicles there may be, and how much memory.
+    most: how many vehicles there may be at once.
 
     Raises InputError on a URI or folder that cannot be used, or where vehicles are listed and none of them has a usable file.
     """
@@ -55,7 +55,7 @@ class ManyService:
         *,
         record: Path | None = None,
         options: Options | None = None,
-        limits: Limits | None = None,
+        most: int = MOST_VEHICLES,
     ) -> None:
         topics = check_sources(sources)
         self.sources = [cast(TopicSource, open_source(one.subscription, Decoder(None))[1]) for one in topics]
@@ -71,7 +71,7 @@ class ManyService:
             self.journal,
             self.outboxes,
             record=record,
-            limits=limits or Limits(),
+            most=most,
         )
         self._unusable = _unusable(roster)
         self.routers = [Router(k, text, self.vehicles) for k, text in enumerate(sources)]

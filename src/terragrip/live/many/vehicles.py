@@ -15,7 +15,6 @@ from pathlib import Path
 from terragrip.errors import reason_of
 from terragrip.live.decode import Decoder, check_channels
 from terragrip.live.inbox import Inbox, steady_clock
-from terragrip.live.many.memory import held_now, in_words
 from terragrip.live.many.roster import Roster
 from terragrip.live.message import EVENT, Message
 from terragrip.live.options import Options
@@ -26,6 +25,7 @@ from terragrip.live.vehicle_run import VehicleRun
 from terragrip.log_events import emit
 
 MOST_BYTES = 64 * 1024  # of a message
+MOST_VEHICLES = 256
 CAPACITY = 1024  # samples of a vehicle that may wait for its estimator
 PREDICT = 10.0  # s of silence: a parked vehicle costs nothing after that
 RETRY = 30.0  # s after which a vehicle that was refused, or failed, may try again
@@ -39,14 +39,6 @@ logger = logging.getLogger("terragrip.live")
 
 Waiting = tuple[int, bytes, float, str]
 """Source, message, arrival, topic."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """``vehicles``: most at once. ``memory`` [bytes]: of the process, above which no other is opened."""
-
-    vehicles: int = 256
-    memory: float = 4e9
 
 
 @dataclass(slots=True)
@@ -77,7 +69,8 @@ class Vehicles:
     """Takes messages by topic, opens runs, and keeps the failure of one from the others.
 
     ``ready``: runs with something to do since they were taken out; ``filled`` and ``asked``: set where there is one, and where a vehicle
-    waits to be opened. What is published goes to ``outboxes`` and to the journal's listeners.
+    waits to be opened. What is published goes to ``outboxes`` and to the journal's listeners. ``most``: vehicles at once, others are
+    refused.
     """
 
     def __init__(
@@ -89,9 +82,9 @@ class Vehicles:
         outboxes: Sequence[Outbox],
         *,
         record: Path | None = None,
-        limits: Limits,
+        most: int,
     ) -> None:
-        self.roster, self.limits = roster, limits
+        self.roster, self.most = roster, most
         self._options, self._topics, self._record = options, topics, record
         self.journal, self._outboxes = journal, outboxes
         self.runs: dict[str, VehicleRun] = {}
@@ -153,9 +146,9 @@ class Vehicles:
             elif not is_name(name):
                 self._report_unnamed(name)
                 return
-            why = self._no_room()
-            if why is not None:
-                self.refuse(name, why)
+            count = len(self.runs) + len(self._waiting)
+            if count >= self.most:
+                self.refuse(name, f"there are already {count} vehicles; raise --max-vehicles")
                 return
             waiting = self._waiting[name] = deque(maxlen=_WAITING)
             self.asked.set()
@@ -169,16 +162,6 @@ class Vehicles:
             self._reported = now
             text = f"{name[:40]!r} in a topic is not a vehicle's name: letters, digits and _ - . alone"
             self.journal.event("vehicle_refused", "service", text)
-
-    def _no_room(self) -> str | None:
-        """Why no other vehicle may be opened; None where one may."""
-        limits, count = self.limits, len(self.runs) + len(self._waiting)
-        if count >= limits.vehicles:
-            return f"there are already {count} vehicles; raise --max-vehicles"
-        held = held_now()
-        if held >= limits.memory:
-            return f"the process already uses {in_words(held)}; raise --memory"
-        return None
 
     def open_next(self) -> bool:
         """Open the vehicle that has waited longest and give it its messages; whether there was one."""
