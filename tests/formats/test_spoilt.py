@@ -173,3 +173,11 @@ def test_the_wheels_of_a_single_axle_that_is_counted_go_by_the_vehicles_names(tm
         "wheel_speed_1l",
         "wheel_speed_1r",
     }
+
+
+def test_a_time_in_a_unit_of_something_else_is_one_line(tmp_path: Path) -> None:
+    """It was a defect of Terragrip with a traceback."""
+    path = tmp_path / "t.csv"
+    path.write_text("time [km/h],ground_speed,wheel_speed_l\n0,1,2\n1,1,2\n")
+    with pytest.raises(InputError, match=r"t\.csv: column time: 'km/h' measures a speed, where a time is"):
+        read(path)

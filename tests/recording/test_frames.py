@@ -41,6 +41,13 @@ def quantities() -> dict[str, Any]:
     return {"time": LOG["time"], "ground_speed": speed, "wheel_speed_l": LOG["wheel_speed_l"]}
 
 
+def of_series(**others: Any) -> dict[str, Any]:
+    """A mapping whose speed is a Series that states its unit itself."""
+    speed = pd.Series(KMH)
+    speed.attrs["units"] = "km/h"
+    return {"time": LOG["time"], "ground_speed": speed, "wheel_speed_l": LOG["wheel_speed_l"], **others}
+
+
 @pytest.mark.parametrize(
     "table",
     [
@@ -56,6 +63,11 @@ def quantities() -> dict[str, Any]:
         pa.Table.from_pandas(beside()),
         {**LOG, "ground_speed": KMH.view(Variable)},
         quantities(),
+        of_series(),
+        of_series(time=LOG["time"].to_numpy(), wheel_speed_l=list(LOG["wheel_speed_l"])),
+        dict(beside()),  # each Series has the units of all columns
+        dict(beside()) | {"time": LOG["time"].to_numpy(), "wheel_speed_l": list(LOG["wheel_speed_l"])},
+        {**LOG, "ground_speed": beside().rename(columns={"time": "v"})["ground_speed"]},
     ],
 )
 def test_a_unit_that_a_table_in_memory_states_is_converted(table: Any) -> None:

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from terragrip.errors import InputError
 from terragrip.formats.table import LogTable
 from terragrip.recording.columns import DAY, SINCE_1970
-from terragrip.units import factor_to
+from terragrip.units import UnitError, factor_to
 
 _FIRST = 1000  # rows in which a logger's clock is set, if it was not
 _WEEK = 7 * DAY  # s: a time of day, or of a GPS week, is less
@@ -40,7 +41,7 @@ class Stamps:
         stamps = table.columns[self.column][: _FIRST + 1]
         if stamps.dtype.kind not in "fiuM" or len(stamps) < 2:
             return table
-        tick = np.timedelta64(1, "s") if stamps.dtype.kind == "M" else 1.0 / factor_to(self.unit, "s")
+        tick = np.timedelta64(1, "s") if stamps.dtype.kind == "M" else 1.0 / self._tick(table)
         with np.errstate(invalid="ignore"):
             steps = np.diff(stamps if stamps.dtype.kind == "M" else stamps.astype(np.float64)) / tick
             jumps = np.flatnonzero(steps > SINCE_1970)
@@ -52,12 +53,20 @@ class Stamps:
         left = {name: values[count:] for name, values in table.columns.items()}
         return replace(table, columns=left, notes=(*table.notes, note))
 
+    def _tick(self, table: LogTable) -> float:
+        """The seconds of a stamp's unit; raises InputError where the log states another quantity."""
+        try:
+            return factor_to(self.unit, "s")
+        except UnitError as error:
+            place, hint = f"column {self.column}", "write its unit, as in 'time [s]' or 'time [ms]'"
+            raise InputError(error.problem, file=table.source, place=place, hint=hint) from error
+
     def _past_midnight(self, table: LogTable) -> LogTable:
         """The table, its stamps counted on where the clock began anew."""
         stamps = table.columns[self.column]
         if stamps.dtype.kind not in "fiu" or not len(stamps):
             return table
-        tick = factor_to(self.unit, "s")
+        tick = self._tick(table)
         seconds = stamps.astype(np.float64) * tick
         known = np.flatnonzero(np.isfinite(seconds))
         if not len(known):

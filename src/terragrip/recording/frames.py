@@ -80,13 +80,18 @@ def _beside(table: Any) -> dict[str, str]:
         return units_of_fields(table.schema)
     stated = _texts(getattr(table, "attrs", {}).get("units"))
     if isinstance(table, Mapping):  # of xarray's variables, pandas' Series, pint's quantities
-        pairs = _variables(table)
-        return stated | _texts(
-            {n: getattr(c, "attrs", {}).get("units", getattr(c, "units", None)) for n, c in pairs}
-        )
+        return stated | _texts({name: _of_column(name, column) for name, column in _variables(table)})
     kinds = getattr(table, "dtypes", None)
     own = kinds.items() if kinds is not None and hasattr(kinds, "items") else ()  # pint-pandas
     return stated | _texts({name: getattr(kind, "units", None) for name, kind in own})
+
+
+def _of_column(name: Any, column: Any) -> Any:
+    """The unit that a column of a mapping states; a Series of a frame has that frame's ``attrs``, the units of all columns."""
+    units = getattr(column, "attrs", {}).get("units", getattr(column, "units", None))
+    if not isinstance(units, Mapping):
+        return units
+    return units.get(column.name, units.get(name))
 
 
 def _is_foreign(name: str, unit: str) -> bool:
