@@ -208,6 +208,17 @@ def test_torques_that_are_0_while_the_machine_pulls_are_an_event(vehicle, long):
     assert event.time < 50
 
 
+def test_an_implausible_number_of_the_vehicle_file_is_an_event_of_the_first_row(long):
+    """As `estimate` notes it. It was one after 20 s of rows, so never of a short drive."""
+    vehicle = robot(sensors={"drawbar_force": 4000.0})
+    recording = long.recording
+    core = core_of(vehicle, recording)
+    outputs = [out for t, values in rows_of(recording) for out in core.process(t, 0, t, values)]
+    said = [out for out in outputs if isinstance(out, Event) and "sensors.drawbar_force" in out.text]
+    assert [(out.kind, out.time) for out in said] == [("contradiction", recording.time[0])]
+    assert said[0].text in tg.estimate(recording, vehicle).notes
+
+
 def test_a_contradiction_that_goes_and_comes_is_said_once(vehicle, monkeypatch):
     monkeypatch.setattr(learning, "ROWS", 50)
     found = iter([True, True, False, True, True, True, False, False, True, True, False, True, True, True])

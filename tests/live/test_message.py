@@ -33,9 +33,19 @@ def test_numbers_are_what_printf_writes_to_nine_digits(numbers, time):
 def test_only_the_wanted_columns_are_written():
     values = {"slip_fl": 0.1, "slip_fl_std": 0.2, "nis": 3.0, "channels": 9.0}
     result = json.loads(Columns("slip_*, channels").json(row(values, predicted=True)))
-    assert list(result) == ["time", "arrival", "event", "predicted", "slip_fl", "slip_fl_std", "channels"]
+    assert list(result) == [
+        "kind",
+        "time",
+        "arrival",
+        "event",
+        "predicted",
+        "slip_fl",
+        "slip_fl_std",
+        "channels",
+    ]
     assert result["predicted"] is True
     assert json.loads(Columns("curve_*").json(row(values))).keys() == {
+        "kind",
         "time",
         "arrival",
         "event",

@@ -14,7 +14,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from drives import robot
+from drives import drive, robot
 from machine import Sender, events, is_settled, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator
@@ -105,7 +105,9 @@ async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
         loop.remove_reader(receiver)
     result = [m for m in got if "slip_fl" in m and not m["predicted"]]
     assert [m["time"] for m in result] == short.recording.time[:300].tolist()
+    assert {m["kind"] for m in result} == {"estimate"}
     assert result[-1].keys() == {
+        "kind",
         "time",
         "arrival",
         "event",
@@ -114,6 +116,29 @@ async def test_datagrams_in_estimates_out(vehicle, short, port, sender):
         "soil_resistance_std",
     } | {f"slip_{w}{std}" for w in vehicle.wheels for std in ("", "_std")}
     assert result[-1]["slip_fl"] == pytest.approx(short.truth["slip_fl"][299], abs=0.05)
+
+
+async def test_each_message_by_udp_says_its_kind_and_what_was_learned(tmp_path, monkeypatch):
+    monkeypatch.setattr("terragrip.estimation.learning.ROWS", 200)
+    log = tmp_path / "drive.parquet"
+    drive(6.0, noise=3.0).recording.to_pandas().to_parquet(log)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
+        receiver.setblocking(False)
+        sink = f"udp://127.0.0.1:{receiver.getsockname()[1]}?columns=slip_fl"
+        vehicle = robot(sensors={"drawbar_force": 4.0})
+        service = Service(vehicle, [f"replay:{log}?speed=max"], [sink])
+        got: list = []
+        asyncio.get_running_loop().add_reader(receiver, lambda: got.append(json.loads(receiver.recv(65536))))
+        await service.run()
+        await until(lambda: got[-1]["kind"] == "status")
+        asyncio.get_running_loop().remove_reader(receiver)
+    kinds = {message["kind"] for message in got}
+    assert {"estimate", "learned", "status"} <= kinds
+    noise, held = service.core.learner.used(service.core.estimator)
+    assert noise
+    assert got[-1]["learned"] == {"noise": noise, "held": held}
 
 
 async def test_simulinks_doubles_in_and_out(vehicle, short, port, sender):

@@ -142,6 +142,7 @@ class SettingsLearner:
         noise, _ = settings_in(log, self._vehicle, sensors=self._noise, held=held)
         seconds = sum(rows[-1 - len(self._channels)] - rows[0] for rows in self._kept.values())
         found = warnings_by_check(log, self._vehicle)
+        found.pop("vehicle", None)  # said with the first row: no row is needed
         said = {name: count for name, count in self._doubtful.items() if count >= 2}
         self._doubtful = said | {name: self._doubtful.get(name, 0) + 1 for name in found}
         doubts = {name: notes for name, notes in found.items() if self._doubtful[name] == 2}

@@ -27,6 +27,7 @@ from terragrip.live.reorder import Pending, Reorder
 from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
 from terragrip.recording.columns import SINCE_1970
+from terragrip.recording.plain_units import size_warnings
 
 if TYPE_CHECKING:
     from terragrip.ground.live import LiveGround
@@ -213,8 +214,10 @@ class Core:
                 out.append(Refusal(row.arrival, row.time, source, str(error), row.values))
                 out.append(Event(row.time, "refused", self.settings.sources[source], str(error)))
                 continue
-            if not self.rows and isinstance(estimator, EngineEstimator):
-                out += [Event(row.time, "schema", "estimator", note) for note in estimator.machine.notes]
+            if not self.rows:
+                out += [Event(row.time, "contradiction", "vehicle", n) for n in size_warnings(self.vehicle)]
+                if isinstance(estimator, EngineEstimator):
+                    out += [Event(row.time, "schema", "estimator", note) for note in estimator.machine.notes]
             self.rows += 1
             out.append(Row(row.arrival, row.values, estimate))
             self._watch(estimate, out)

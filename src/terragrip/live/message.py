@@ -32,12 +32,15 @@ class Message:
     _json: dict[Columns | None, bytes] = field(default_factory=dict)
 
     def json(self, columns: Columns | None = None) -> bytes:
-        """The message as a JSON object; of an estimate, ``columns`` or all of them. Missing numbers are null."""
+        """The message as a JSON object, with its ``kind``, of an event its own; of an estimate ``columns`` or all. Missing numbers are null."""
+        row = self.row
+        columns = None if row is None else columns
         result = self._json.get(columns)
         if result is None:
-            row = self.row
             result = self._json[columns] = (
-                json.dumps(self.data).encode() if row is None else (columns or _EVERY).json(row)
+                json.dumps({"kind": self.kind} | (self.data or {})).encode()
+                if row is None
+                else (columns or _EVERY).json(row)
             )
         return result
 
@@ -75,7 +78,7 @@ class Columns:
         numbers = template % tuple(map(estimate.values.__getitem__, places.values()))
         if ":n" in numbers or "inf" in numbers:
             numbers = _NOT_FINITE.sub(":null", numbers)
-        head = f'{{"time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'
+        head = f'{{"kind":"{ESTIMATE}","time":{estimate.time!r},"arrival":{row.arrival!r},"event":"{estimate.event}"'
         return f'{head},"predicted":{"true" if row.predicted else "false"}{numbers}'.encode()
 
 

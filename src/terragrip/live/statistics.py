@@ -123,6 +123,8 @@ class Statistics:
             "events": dict(self.event_counts),
             "sinks": {box.uri.name: {"sent": box.sent, "dropped": box.dropped} for box in self._outboxes},
         }
+        if core.learner is not None and core.estimator is not None:
+            result["learned"] = dict(zip(("noise", "held"), core.learner.used(core.estimator), strict=True))
         if self.is_real_time:  # a replay's rows arrive at their own stamps, and its pauses are the file's
             now = self._inbox.clock()
             silent = [why for feed in self.feeds if (why := feed.why_old(now))]

@@ -38,6 +38,7 @@ NAMES = {
 _NUMBER = {"type": ["number", "null"]}
 _TEXT = {"type": "string"}
 _COUNT = {"type": "integer"}
+_NUMBERS = {"type": "object", "additionalProperties": {"type": "number"}}
 _TIME = {"type": ["number", "null"], "description": "s, on the samples' time base"}
 
 _PROPERTIES: dict[str, dict[str, Any]] = {
@@ -52,7 +53,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "time": _TIME,
         "soil": _TEXT,
         "probability": _NUMBER,
-        "probabilities": {"type": "object", "additionalProperties": {"type": "number"}},
+        "probabilities": _NUMBERS,
     },
     SETPOINT: {
         "time": _TIME,
@@ -81,6 +82,11 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         },
         "events": {"type": "object", "additionalProperties": _COUNT},
         "sinks": {"type": "object"},
+        "learned": {
+            "type": "object",
+            "description": "by channel, of those that are learned: noise (SD, SI) and held (period of its updates, s)",
+            "properties": {"noise": _NUMBERS, "held": _NUMBERS},
+        },
     },
 }
 
@@ -189,4 +195,5 @@ class FoxgloveSink:
 def schema_of(kind: str, columns: Iterable[str] = ()) -> dict[str, Any]:
     """The schema of a kind of message; of an estimate, with the vehicle's ``columns``."""
     own = dict.fromkeys(columns, _NUMBER) if kind == ESTIMATE else {}
-    return {"title": NAMES[kind], "type": "object", "properties": _PROPERTIES[kind] | own}
+    properties = {"kind": {"type": "string", "const": kind}} | _PROPERTIES[kind] | own
+    return {"title": NAMES[kind], "type": "object", "properties": properties}

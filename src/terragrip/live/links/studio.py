@@ -23,7 +23,7 @@ from terragrip.estimation.columns import wheels_with
 from terragrip.estimation.engine import EVENTS
 from terragrip.live.credentials import Credentials
 from terragrip.live.feed import Lost
-from terragrip.live.message import ESTIMATE, EVENT, Columns, Message
+from terragrip.live.message import Columns, Message
 from terragrip.live.outbox import Outbox
 from terragrip.live.uri import Uri, is_loopback
 from terragrip.prometheus_text import CONTENT_TYPE
@@ -193,16 +193,7 @@ class Broadcast:
                     event = EVENTS.index(row.estimate.event)
                     numbers = (values[places[n]] if n in places else math.nan for n in columns)
                     yield packer.pack(row.estimate.time, row.predicted, event, *numbers)
-                elif message.kind == EVENT:
-                    yield message.json().decode()
                 else:
-                    yield _named(
-                        message.kind, message.json(client.columns if message.kind == ESTIMATE else None)
-                    )
+                    yield message.json(client.columns).decode()
         finally:
             self._clients.remove((name, client))
-
-
-def _named(kind: str, data: bytes) -> str:
-    """A JSON object with its kind in front."""
-    return f'{{"kind":"{kind}",{data[1:].decode()}'
