@@ -32,7 +32,7 @@ class Message:
     _json: dict[Columns | None, bytes] = field(default_factory=dict)
 
     def json(self, columns: Columns | None = None) -> bytes:
-        """The message as a JSON object, with its ``kind``, of an event its own; of an estimate ``columns`` or all. Missing numbers are null."""
+        """The message as a JSON object with its ``kind``; of an estimate, ``columns`` or all of them. Missing numbers are null."""
         row = self.row
         columns = None if row is None else columns
         result = self._json.get(columns)
