@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 
 from terragrip.errors import InputError
-from terragrip.formats import inspect, read_table
+from terragrip.formats import Profile, inspect, read, read_table
+from terragrip.formats.matlab_objects import plain
 from test_matlab_exports import write_hdf5
 
 TIME = np.arange(200) / 20
@@ -172,3 +175,98 @@ def test_vectors_of_another_length_are_named_where_nothing_is_time(tmp_path: Pat
     scipy.io.savemat(tmp_path / "log.mat", {"w": SPEED, "x": HOT, "v": SPEED[::4], "K": np.ones(3)})
     (note,) = read_table(tmp_path / "log.mat").notes
     assert "others were left out: v (50)" in note
+
+
+OURS = {"ground_speed": 3.6 * SPEED, "wheel_speed_l": 5 * SPEED, "wheel_speed_r": 5 * SPEED}
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+@pytest.mark.parametrize("nested", [False, True], ids=["beside", "around"])
+def test_a_struct_of_units_beside_the_signals_is_used(tmp_path: Path, version: str, nested: bool) -> None:
+    """km/h were m/s without a word, and milliseconds seconds."""
+    units = {"units": {"ground_speed": "km/h", "t": "ms", "wheel_speed_l": ""}}
+    signals = {"t": 1000 * TIME, **OURS}
+    path = saved(
+        tmp_path / "log.mat", version, {"log": signals, **units} if nested else {"log": {**signals, **units}}
+    )
+    table = read_table(path)
+    assert table.units == {"log.ground_speed": "km/h"}
+    assert np.allclose(table.columns["time"], TIME)
+    names = {name: f"log.{name}" for name in OURS}
+    assert np.allclose(read(path, Profile.from_dict({"channels": names}))["ground_speed"], SPEED)
+
+
+@pytest.mark.parametrize("version", ["v7", "v73"])
+def test_the_units_of_a_tables_variables_are_used(shared: Callable[[str], Path], version: str) -> None:
+    table = read_table(shared("data/ingest_samples/matlab") / f"test_tables_{version}.mat")
+    assert table.units == {"timetable_with_attrs.data1": "m/s"}
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+@pytest.mark.parametrize("kind", ["cell", "char", "one text"])
+def test_labels_are_read(tmp_path: Path, version: str, kind: str) -> None:
+    """They were left out without a word, and the log was unlabelled."""
+    soil = ["grass"] * 100 + ["sand"] * 98 + ["", "clay"]
+    content: dict[str, object] = {"t": TIME, **OURS}
+    path = tmp_path / "log.mat"
+    if kind == "one text":
+        soil = ["grass"] * len(TIME)
+        saved(path, version, {**content, "soil": "grass"})
+    elif version == "5":
+        scipy.io.savemat(path, {**content, "soil": np.array(soil, dtype=object if kind == "cell" else "U")})
+    else:
+        write_hdf5(path, content)
+        with h5py.File(path, "a") as file:
+            codes = [np.array([[ord(c)] for c in text.ljust(5)], dtype=np.uint16) for text in soil]
+            if kind == "char":
+                dataset = file.create_dataset("soil", data=np.hstack(codes))
+                dataset.attrs["MATLAB_class"] = np.bytes_("char")
+            else:
+                refs = file.create_dataset("soil", (1, len(soil)), dtype=h5py.ref_dtype)
+                refs.attrs["MATLAB_class"] = np.bytes_("cell")
+                for k, one in enumerate(codes):
+                    text = file.create_dataset(f"#refs#/s{k}", data=one)
+                    text.attrs["MATLAB_class"] = np.bytes_("char")
+                    refs[0, k] = text.ref
+    assert (
+        read(path, Profile.from_dict({"time": {"from": "time"}, "channels": {n: n for n in (*OURS, "soil")}}))
+        .labels["soil"]
+        .tolist()
+        == soil
+    )
+
+
+def test_labels_of_a_categorical_and_of_a_tables_column_are_read() -> None:
+    labels = pd.Categorical(["grass", None, "sand"])
+    frame = pd.DataFrame({"v": [1.0, 2, 3], "soil": labels, "w": ["a", "b", "c"]})
+    frame.attrs["VariableUnits"] = ["km/h", "", ""]
+    table = plain(frame)
+    assert (table["soil"], table["w"]) == (["grass", "", "sand"], ["a", "b", "c"])
+    assert table["units"] == {"v": "km/h", "soil": "", "w": ""}
+    assert plain(labels) == ["grass", "", "sand"]
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+@pytest.mark.parametrize("channel", ["ground_speed", "wheel_speed_r"])
+def test_a_channel_one_sample_shorter_than_time_is_refused(
+    tmp_path: Path, version: str, channel: str
+) -> None:
+    """It was 'missing', and a torque or a pull was none, with a note."""
+    path = saved(tmp_path / "log.mat", version, {"t": TIME, **OURS, channel: SPEED[:-1]})
+    with pytest.raises(InputError, match=f"signal {channel}: has 199 samples, and the time vector beside it"):
+        read(path)
+
+
+def test_a_signal_whose_name_has_its_unit_is_hinted_at(tmp_path: Path) -> None:
+    own = {("ground_speed_kmh" if n == "ground_speed" else n): values for n, values in OURS.items()}
+    scipy.io.savemat(tmp_path / "log.mat", {"t": TIME, **own})
+    with pytest.raises(InputError, match=r"'ground_speed: \{from: ground_speed_kmh, unit: kmh\}'"):
+        read(tmp_path / "log.mat")
+
+
+def test_our_own_estimates_are_no_log(tmp_path: Path) -> None:
+    names = ("time", "ground_speed", "ground_speed_std", "distance", "event")
+    scipy.io.savemat(tmp_path / "e.mat", {"estimates": dict.fromkeys(names, SPEED), "units": {"time": "s"}})
+    for reader in (read, inspect):
+        with pytest.raises(InputError, match=r"e\.mat: holds estimates, not a log"):
+            reader(tmp_path / "e.mat")

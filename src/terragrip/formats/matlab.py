@@ -25,6 +25,7 @@ from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import Clock, Samples, SignalLog, signals_of
 from terragrip.formats.table import LogTable, Sparse, Wanted
 from terragrip.formats.worker import Reading, UnreadableError, Worker
+from terragrip.recording.checks import refuse_estimates
 
 _NO_OBJECTS = ("", "function", "sparse", "function_handle")
 
@@ -43,10 +44,17 @@ def read_matlab(path: str, wanted: Wanted, databases: Databases) -> SignalLog | 
                 pass  # the notes name what is left
         contents = _contents(tree, path, isinstance(wanted, Sparse))
         outline = _outline(contents)
-        return _log(outline, _samples(contents, _chosen(outline, wanted)), wanted)
+        return _log(outline, _samples(contents, _chosen(outline, path, wanted)), wanted)
 
 
-def _chosen(outline: _Outline, wanted: Wanted) -> list[str]:
+def _chosen(outline: _Outline, path: str, wanted: Wanted) -> list[str]:
+    """The signals that are wanted; raises InputError where one of them does not fit its time vector: it would be missing."""
+    odd = None if isinstance(wanted, Sparse) else next(filter(wanted, outline.odd), None)
+    if odd is not None:
+        length, instants = outline.odd[odd]
+        problem = f"has {length} samples, and the time vector beside it {instants}"
+        hint = "save vectors of one length, or a signal at another rate in a struct with its own time"
+        raise InputError(problem, file=path, place=f"signal {odd}", hint=hint)
     return [name for name in outline.names if wanted(name)]
 
 
@@ -55,7 +63,7 @@ def _by_matio(path: str, wanted: Wanted) -> SignalLog | LogTable:
         "terragrip.formats.matlab:items_of", "matio", path, "MATLAB file", isinstance(wanted, Sparse)
     ) as worker:
         outline = worker.receive()
-        worker.send(_chosen(outline, wanted))
+        worker.send(_chosen(outline, path, wanted))
         return _log(outline, worker, wanted)
 
 
@@ -70,7 +78,7 @@ def items_of(path: str, first_run: bool) -> Reading:
             file = kept.enter_context(h5py.File(path, "r"))
             tree, records = tree_of(file, h5py), file.get(STREAM)
             names = [name for name, value in tree.items() if _holds_object(value)]
-        loaded = matio.load_from_mat(path, variable_names=names)
+        loaded = matio.load_from_mat(path, variable_names=names, add_table_attrs=True)
         for name in names or [name for name in loaded if not name.startswith("__")]:
             if name in loaded and (value := resolved(plain(loaded.pop(name)), records, TICKS)) is not None:
                 tree[name] = value
@@ -93,6 +101,7 @@ class _Outline:
     names: tuple[str, ...]
     notes: tuple[str, ...]
     is_table: bool
+    odd: dict[str, tuple[int, int]]
 
 
 def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
@@ -100,6 +109,9 @@ def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
 
     Raises InputError where there are none.
     """
+    estimates = tree.get("estimates")
+    if isinstance(estimates, Mapping):
+        refuse_estimates(estimates, path)
     contents = Contents()
     walk(tree, "", contents, 0)
     if first_run:  # nobody has named a run: signals of two must not be mixed
@@ -120,7 +132,7 @@ def _contents(tree: Mapping[str, Any], path: str, first_run: bool) -> Contents:
 
 def _outline(contents: Contents) -> _Outline:
     notes = (*_notes(contents), *contents.notes)
-    return _Outline(tuple(contents.signals or contents.loose), notes, not contents.signals)
+    return _Outline(tuple(contents.signals or contents.loose), notes, not contents.signals, contents.odd)
 
 
 def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samples]:
@@ -129,7 +141,9 @@ def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samp
     matrix, whole = None, np.empty(0)
     for name in chosen:
         if not contents.signals:
-            yield Samples(name, None, read_array(contents.loose[name]).ravel().astype(np.float64))
+            values = read_array(contents.loose[name]).ravel()
+            values = values if values.dtype == object else values.astype(np.float64)
+            yield Samples(name, None, values, contents.units.get(name))
             continue
         clock, values, column = contents.signals[name]
         length = int(np.prod(clock.shape))
@@ -142,14 +156,16 @@ def _samples(contents: Contents, chosen: Iterable[str]) -> Iterator[Clock | Samp
             if matrix is not values:
                 matrix, whole = values, read_array(values)  # columns of one matrix stand side by side
             flat = whole.reshape(length, -1)[:, column or 0]
-        yield Samples(name, id(clock), np.asarray(flat, dtype=np.float64), contents.units.get(name))
+        flat = flat if flat.dtype == object else np.asarray(flat, dtype=np.float64)
+        yield Samples(name, id(clock), flat, contents.units.get(name))
 
 
 def _log(outline: _Outline, items: Iterable[Clock | Samples], wanted: Wanted) -> SignalLog | LogTable:
     if not outline.is_table:
         return SignalLog(outline.names, signals_of(items, wanted), notes=outline.notes)
-    columns = {one.name: one.values for one in items if isinstance(one, Samples)}
-    return LogTable(outline.names, columns, notes=outline.notes)
+    every = [one for one in items if isinstance(one, Samples)]
+    units = {one.name: one.unit for one in every if one.unit}
+    return LogTable(outline.names, {one.name: one.values for one in every}, units, notes=outline.notes)
 
 
 def _notes(contents: Contents) -> list[str]:
@@ -200,6 +216,7 @@ def _keep_one_length(contents: Contents) -> None:
             f"No vector is named as time (t, time, tout, t_gps ...), and most have {length} numbers; others were left out: {_some(others)}."
         )
     contents.loose = {name: value for name, value in contents.loose.items() if lengths[name] == length}
+    contents.loose |= {name: texts for name, texts in contents.texts.items() if len(texts) == length}
 
 
 FORMATS = (

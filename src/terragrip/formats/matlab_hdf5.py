@@ -41,12 +41,17 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
         return None
     kind = item.attrs.get("MATLAB_class", b"")
     if h5py.check_ref_dtype(item.dtype) is not None:
-        references = item[()].ravel()[: 1 << 16]
+        references = item[()].ravel()[: 1 << 20]
         return [_of_hdf5(file, file[reference], depth + 1, h5py) for reference in references if reference]
     if kind == b"char":
-        return "".join(map(chr, item[()].ravel(order="F").tolist()))
+        rows = item[()].T
+        if rows.ndim == 2 and min(rows.shape) > 1:  # a text in each row, padded with blanks
+            return ["".join(map(chr, row)) for row in rows.tolist()]
+        return "".join(map(chr, rows.ravel().tolist()))
     if item.dtype.names:
         return {name: np.asarray(item[name]) for name in item.dtype.names}
+    if h5py.check_string_dtype(item.dtype) is not None and item.ndim:
+        return item.asstr(errors="replace")[()].ravel().tolist()
     if item.dtype.kind in "fiub":
         return _array_of_hdf5(item, turned=bool(kind))
     return None

@@ -55,7 +55,7 @@ def _on_one_clock(tree: dict[str, Any]) -> tuple[Contents, Array | None]:
     arrays = [array for clock, values, _ in contents.signals.values() for array in (clock, values)]
     in_parts = all(isinstance(array, Array) and array.part is not None for array in arrays)
     one = len({id(clock) for clock in arrays[::2]}) == 1
-    return contents, arrays[0] if one and in_parts and not contents.opaque else None
+    return contents, arrays[0] if one and in_parts and not (contents.opaque or contents.odd) else None
 
 
 def _block(contents: Contents, clock: Array, chosen: list[str], part: slice) -> dict[str, Floats]:

@@ -54,6 +54,8 @@ def plain(value: Any, room: _Room | None = None) -> Any:
         return _of_object(value, room)
     if hasattr(value, "columns") and hasattr(value, "index"):
         return _of_table(value)
+    if hasattr(value, "categories"):
+        return list(map(_text, value.tolist()))
     if isinstance(value, Mapping):
         return {str(key): plain(part, room.inner()) for key, part in value.items()}
     if value is None or isinstance(value, str):
@@ -75,13 +77,25 @@ def _of_array(value: npt.NDArray[Any], room: _Room) -> Any:
         ]
         return structs[0] if len(structs) == 1 else structs
     if value.dtype.kind == "O":
+        texts = list(map(_text, value.ravel(order="F")))
+        if len(texts) > 1 and None not in texts:
+            return texts
         return [plain(part, room.inner()) for part in value.ravel(order="F")[:_MOST]]
     if value.dtype.kind in "UST":
-        texts = [str(text) for text in value.ravel(order="F")[:_MOST]]
+        texts = list(map(_text, value.ravel(order="F")))
         return texts[0] if len(texts) == 1 else texts or ""
     if value.dtype.kind in "mM":
         return _seconds(value)
     return np.asarray(value) if value.dtype.kind in "fiub" else Opaque("complex")
+
+
+def _text(part: Any) -> str | None:
+    """A text in a cell or an array, empty where it is missing; None of anything else."""
+    if isinstance(part, np.ndarray) and part.dtype.kind in "UT" and part.size < 2:
+        part = part.item() if part.size else ""
+    if isinstance(part, float) and np.isnan(part):  # <missing>, <undefined>
+        return ""
+    return str(part) if isinstance(part, str) else None
 
 
 def _of_object(value: Any, room: _Room) -> Any:
@@ -190,8 +204,11 @@ def _scalar(value: Any) -> float | None:
 def _of_table(frame: Any) -> dict[str, Any]:
     index = frame.index
     columns = {str(name): _of_column(frame[name]) for name in frame.columns}
+    units = frame.attrs.get("VariableUnits") or frame.attrs.get("varUnits") or []
     if index.dtype.kind in "mM":
         columns["time"] = _of_column(index.to_series())
+    if len(units) == len(frame.columns):  # not where a variable has several columns
+        columns.setdefault("units", dict(zip(map(str, frame.columns), map(str, units), strict=True)))
     return {name: column for name, column in columns.items() if column is not None}
 
 
@@ -200,7 +217,10 @@ def _of_column(column: Any) -> Any:
         column = column.dt.tz_convert("UTC").dt.tz_localize(None)
     if column.dtype.kind in "mM":
         return _seconds(column.to_numpy())
-    return column.to_numpy() if column.dtype.kind in "fiub" else None
+    if column.dtype.kind in "fiub":
+        return column.to_numpy()
+    texts = list(map(_text, column))
+    return None if None in texts else texts
 
 
 def _seconds(value: npt.NDArray[Any]) -> npt.NDArray[np.float64] | Opaque:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.matlab_values import Array, Opaque, read_array
-from terragrip.units import is_common
+from terragrip.formats.matlab_values import Array, Opaque, read_array, texts_of
+from terragrip.recording.schema import LABELS
+from terragrip.units import UnitError, factor_to, is_common
 
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
 _SCALES = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -37,7 +38,7 @@ _DATENUM_1970 = 719_529.0
 @dataclass
 class Contents:
     """Signals by name, with what their clock and column are read from; ``opaque`` objects with their class; ``loose`` vectors without
-    a clock; ``odd`` ones of another length than their clock, with both lengths; ``matrices`` without a clock beside them.
+    a clock, ``texts`` likewise; ``odd`` ones of another length than their clock, with both lengths; ``matrices`` without a clock.
 
     ``runs``: arrays of drives, and how many they hold; ``notes`` say which of several vectors was taken for time.
     """
@@ -47,14 +48,22 @@ class Contents:
     units: dict[str, str] = field(default_factory=dict)
     opaque: dict[str, str] = field(default_factory=dict)
     loose: dict[str, Any] = field(default_factory=dict)
+    texts: dict[str, Any] = field(default_factory=dict)
     odd: dict[str, tuple[int, int]] = field(default_factory=dict)
     matrices: dict[str, Any] = field(default_factory=dict)
     runs: dict[str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
-def walk(value: Any, name: str, contents: Contents, depth: int, above: Any = None) -> None:
-    """Find the signals under a value; ``above``: the time vector of the structs around it, for those that have none."""
+class Around(NamedTuple):
+    """What a struct has from those around it: their time vector, where it has none, and the units that they state by name."""
+
+    clock: Any = None
+    units: Mapping[str, Any] = {}
+
+
+def walk(value: Any, name: str, contents: Contents, depth: int, above: Around = Around()) -> None:  # noqa: B008  (immutable)
+    """Find the signals under a value; ``above``: what the structs around it say."""
     if depth > _DEEPEST:
         return
     if isinstance(value, Opaque):
@@ -78,53 +87,78 @@ def _is_run(part: Any, first: Any) -> bool:
     return len(vectors) > 2 and any(key in _TIMES for key in vectors)
 
 
-def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Any) -> None:
+def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Around) -> None:
     if _x_and_y(struct, name, contents):
         return
-    clocks = _clocks(struct, name, contents, above)
+    own_units = _value(struct, _UNITS)
+    units = own_units if isinstance(own_units, Mapping) else above.units
+    clocks = _clocks(struct, name, contents, Around(above.clock, units))
     if clocks and _structure_with_time(_value(struct, ("signals",)), clocks, name, contents):
         return
     clock = next(iter(clocks.values()), None)
-    _add_those_beside(clocks, struct, name, contents)
+    _add_those_beside(clocks, struct, name, contents, units)
     for key, part in struct.items():
-        own = _joined(name, key)
+        own, texts = _joined(name, key), texts_of(part)
         if _is_numeric(part):
             if clock is None:
                 (contents.loose if _is_vector(part) else contents.matrices)[own] = part
+                _add_unit(contents, own, units.get(key))
+        elif texts is not None:
+            if clock is None:
+                contents.texts[own] = texts
         elif not isinstance(part, str):
             if key.lower() == "values" and isinstance(part, Mapping | Opaque):
                 own = name  # a Dataset's element: its name is the signal's
             elif key.lower() in ("elements", "signals"):
                 own = _joined(name, _own_name(part))  # one element alone is no list
-            walk(part, own, contents, depth + 1, clock)
+            below = Around(clock, units[key] if isinstance(units.get(key), Mapping) else units)
+            walk(part, own, contents, depth + 1, below)
 
 
-def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Any) -> dict[int, Any]:
+def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Around) -> dict[int, Any]:
     """The time vectors of a struct's signals by their length: first its own, or the one ``above``; empty if there is none."""
     own = _clock_name(struct, name, contents)
-    clock = above if own is None else struct[own]
+    clock = above.clock if own is None else struct[own]
     others = _other_clocks(struct, clock)
     if clock is None and len(others) < 2:
         return {}
     for key in filter(None, (own, *others.values())):
-        contents.scales[id(struct[key])] = _SCALES.get(key.rpartition("_")[2].lower(), 1.0)
+        scale, unit = _SCALES.get(key.rpartition("_")[2].lower(), 1.0), above.units.get(key)
+        if isinstance(unit, str) and unit.strip():
+            try:
+                scale = factor_to(unit, "s")
+            except UnitError as error:
+                contents.notes.append(f"The unit of {_joined(name, key)} is not used: {error.problem}.")
+        contents.scales[id(struct[key])] = scale
     first = {} if clock is None else {int(np.prod(clock.shape)): clock}
     return first | {length: struct[key] for length, key in others.items()}
 
 
 def _add_those_beside(
-    clocks: Mapping[int, Any], struct: Mapping[str, Any], name: str, contents: Contents
+    clocks: Mapping[int, Any],
+    struct: Mapping[str, Any],
+    name: str,
+    contents: Contents,
+    units: Mapping[str, Any],
 ) -> None:
     """Add the signals of a struct that have as many instants as one of the clocks (by length, the first before others)."""
-    for key, part in struct.items():
-        if not clocks or not _is_numeric(part) or any(part is clock for clock in clocks.values()):
+    first = next(iter(clocks), 0)
+    for key, part in struct.items() if clocks else ():
+        texts = texts_of([part] * first if key in LABELS and isinstance(part, str) else part)
+        if texts is not None:
+            part = texts
+        elif not _is_numeric(part) or any(part is clock for clock in clocks.values()):
             continue
-        first, length = next(iter(clocks)), next((n for n in clocks if n in part.shape), None)
-        if length is not None:
+        length = next((n for n in clocks if n in part.shape), None)
+        if texts is not None and length is not None:
+            contents.signals[_joined(name, key)] = clocks[length], texts, None
+        elif length is not None:
             plain = key.lower() in _DATA and name
-            unit = _value(struct, _UNITS) if plain else None
+            stated = _value(struct, _UNITS) if plain else None
+            unit = stated if isinstance(stated, str) and is_common(stated) else units.get(key)
             _add(contents, name if plain else _joined(name, key), clocks[length], part, length, unit)
-        elif _is_vector(part) and max(part.shape) > first / 2:  # shorter ones are parameters
+        elif max(part.shape) > first / 2 and (texts is not None or _is_vector(part)):
+            # shorter ones are parameters
             contents.odd[_joined(name, key)] = max(part.shape), first
 
 
@@ -206,7 +240,9 @@ def _x_and_y(struct: Mapping[str, Any], name: str, contents: Contents) -> bool:
         clock = clocks[at]["Data"]
         length, count = max(clock.shape), max(values.shape)
         if count == length:
-            _add(contents, own, clock, values, length, one.get("Unit"))
+            unit = one.get("Unit")
+            unit = unit if isinstance(unit, str) and is_common(unit) else None
+            _add(contents, own, clock, values, length, unit)
         else:
             contents.odd[own] = count, length
     return True
@@ -242,8 +278,12 @@ def _add(contents: Contents, name: str, clock: Any, values: Any, length: int, un
     for k in range(width):
         own = f"{name}[{k}]" if width > 1 else name
         contents.signals[own] = clock, table, k if width > 1 else None
-        if isinstance(unit, str) and is_common(unit):
-            contents.units[own] = unit
+        _add_unit(contents, own, unit)
+
+
+def _add_unit(contents: Contents, name: str, unit: Any) -> None:
+    if isinstance(unit, str) and unit.strip():
+        contents.units[name] = unit.strip()
 
 
 def oriented(values: Any, length: int) -> Any:

@@ -35,6 +35,15 @@ class Array:
         return self.read().reshape(length, -1)[rows, number]
 
 
+def texts_of(value: Any) -> npt.NDArray[np.object_] | None:
+    """A text for each instant (n,), as a cell of texts or an array of strings holds labels, missing = empty; None of anything else."""
+    if not isinstance(value, list) or len(value) < 2 or not any(isinstance(part, str) for part in value):
+        return None
+    if not all(part is None or isinstance(part, str) for part in value):
+        return None
+    return np.array([(part or "").strip() for part in value], dtype=object)
+
+
 def read_array(value: Any) -> npt.NDArray[Any]:
     """The numbers of an `Array`, or of what is one already."""
     return value.read() if isinstance(value, Array) else np.asarray(value)

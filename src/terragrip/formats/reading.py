@@ -212,12 +212,8 @@ def _timed(table: LogTable) -> LogTable:
 
 
 def _require(table: LogTable) -> None:
-    try:
-        checks.require_columns(table.names, table.source, table.units)
-    except InputError as error:
-        if not table.clocked:
-            raise
-        hint = f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
-        raise InputError(
-            error.problem, file=error.file, place=error.place, hint=hint, page=error.page
-        ) from error
+    profiles = (
+        f"map its signals in a profile: {', '.join(SHIPPED)}, or your own ('terragrip inspect' proposes one)"
+    )
+    hint = profiles if table.clocked else None
+    checks.require_columns(table.names, table.source, table.units, where_signals=hint)

@@ -79,11 +79,16 @@ def place(column: str, row: int, time: Floats | None = None, *, first_row: int =
 
 
 def require_columns(
-    columns: Collection[str], source: str | None, units: Mapping[str, str] | None = None
+    columns: Collection[str],
+    source: str | None,
+    units: Mapping[str, str] | None = None,
+    *,
+    where_signals: str | None = None,
 ) -> None:
     """Raise InputError unless time, ground_speed and a wheel speed are among the columns, and they are not those of estimates.
 
-    ``units``: those that the table states, which a column that is to be renamed should keep.
+    ``units``: those that the table states, which a column that is to be renamed should keep. ``where_signals``: the hint where the columns
+    are signals, whose names are not easily changed, and none is near.
     """
     if not columns:
         raise InputError("there are no columns", file=source, hint="give a table with a header")
@@ -101,12 +106,16 @@ def require_columns(
     # Name first the missing column that resembles one in the table.
     name = next((n for n in missing if near[n]), missing[0])
     unit = (units or {}).get(near[name] or "") or unit_behind(near[name] or "", name)
-    new = f" '{name} [{unit}]'" if unit else ""
-    hint = f"the nearest column is {near[name]!r}: rename it{new}, or map it in a profile"
     if near[name] is None:
-        hint = "map the log's columns in a profile ('terragrip inspect' proposes one)"
+        hint = where_signals or "map the log's columns in a profile ('terragrip inspect' proposes one)"
         if name == TIME and source is None:
             hint = "name the table's column or index of seconds 'time'"
+    elif where_signals is not None:
+        entry = f"{{from: {near[name]}, unit: {unit}}}" if unit else near[name]
+        hint = f"the nearest signal is {near[name]!r}: map it in a profile, '{name}: {entry}'"
+    else:
+        new = f" '{name} [{unit}]'" if unit else ""
+        hint = f"the nearest column is {near[name]!r}: rename it{new}, or map it in a profile"
     page = "formats#in-a-profile"
     raise InputError("is missing", file=source, place=f"column {name}", hint=hint, page=page)
 
