@@ -492,6 +492,48 @@ def test_patterns_take_no_column_of_another_machine(foreign: pd.DataFrame) -> No
     assert not any("machines" in note for note in result.notes)
 
 
+def test_a_namespace_picks_one_of_several_machines(foreign: pd.DataFrame) -> None:
+    columns = {"stamp": foreign["stamp"], "/fix.x": 9.0}
+    for k, robot in enumerate(("/r1", "/r2"), 1):
+        columns |= {f"{robot}/joints.fl": 5.0 * k, f"{robot}/gps/vel.x": 1.0 * k}
+    log = pd.DataFrame(columns)
+    content = {
+        "time": {"from": "stamp"},
+        "channels": {"ground_speed": {"from": ["*fix.x", "*vel.x"]}, "wheel_speed_fl": "/joints.fl"},
+    }
+    profile = Profile.from_dict({**content, "namespace": "r2"})
+    for one in (profile, Profile.from_dict(profile.to_dict())):
+        result = one.apply(log)
+        assert (result["ground_speed"][0], result["wheel_speed_fl"][0]) == (2.0, 10.0)
+        assert not any("machines" in note for note in result.notes)
+    with pytest.raises(InputError, match=r"column /r3/\*fix\.x: is missing"):
+        Profile.from_dict({**content, "namespace": "/r3"}).apply(log)
+
+
+@pytest.mark.parametrize("empty", [0.0, np.nan])
+def test_efforts_that_are_nothing_but_0_are_no_torques(foreign: pd.DataFrame, empty: float) -> None:
+    """A driver without a current sensor fills them in; adhesion was 0 with an interval. A torque of another name may be 0."""
+    names = {
+        "/joint_states.velocity.front_left": "wheel_speed_fl",
+        "/joint_states.effort.front_left": "drive_torque_fl",
+    }
+    log = foreign.rename(columns={"rpm_left": "/joint_states.velocity.front_left"})
+    log = log.assign(**{"/joint_states.effort.front_left": empty, "torque": 0.0})
+    content = {
+        "time": {"from": "stamp"},
+        "channels": {"ground_speed": "kmh", **{v: k for k, v in names.items()}},
+    }
+    result = Profile.from_dict(content).apply(log)
+    assert "drive_torque_fl" not in result
+    note = "/joint_states.effort.front_left hold nothing but 0, as drivers do that measure no torque: drive_torque_fl"
+    assert any(text.startswith(note) for text in result.notes)
+    content["channels"]["drive_torque_fl"] = "torque"
+    np.testing.assert_array_equal(Profile.from_dict(content).apply(log)["drive_torque_fl"], 0.0)
+    log["/joint_states.effort.front_left"] = np.where(np.arange(len(log)) == 1, 2.0, empty)
+    content["channels"]["drive_torque_fl"] = "/joint_states.effort.front_left"
+    assert Profile.from_dict(content).apply(log)["drive_torque_fl"][1] == 2.0
+
+
 def test_a_velocity_on_the_axes_of_a_map_is_named(foreign: pd.DataFrame) -> None:
     """An odometry in its map's frame, driven north-east: its x alone was the ground speed, and slip .46 in place of .10."""
     log = foreign.assign(**{"/vo.linear.x": 0.6 * foreign["kmh"], "/vo.linear.y": 0.8 * foreign["kmh"]})

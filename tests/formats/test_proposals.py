@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
 from terragrip.cli import main
 from terragrip.errors import InputError
-from terragrip.formats import inspect, read
-from terragrip.formats.proposal import missing_channels
+from terragrip.formats import Profile, inspect, read
+from terragrip.formats.proposal import missing_channels, profile_text
 from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.vehicle import Vehicle
@@ -658,3 +659,36 @@ def test_channels_of_two_robots_in_one_bag_are_not_mixed() -> None:
     )
     columns["/alpha/gps/vel.twist.linear.x"] = SPEED
     assert _propose(columns)["ground_speed"].columns[0].startswith("/alpha")
+
+
+@pytest.mark.parametrize(
+    "robots", [("/r1", "/r2"), ("/left", "/right"), ("/front", "/rear"), ("/target_1", "/a")]
+)
+def test_names_are_read_inside_a_robots_namespace(robots: tuple[str, str]) -> None:
+    """Of /r1 the ground speed was lost, of /left the right wheels, of /front the rear ones, of /target_1 all."""
+    columns = {}
+    for robot in robots:
+        for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
+            columns[f"{robot}/joint_states.velocity.{wheel}_wheel"] = 5 * SPEED
+            columns[f"{robot}/joint_states.effort.{wheel}_wheel"] = 30 + 2 * np.sin(TIME)
+        columns[f"{robot}/gps/vel.twist.linear.x"] = SPEED
+    proposals = _propose(columns)
+    expected = {
+        f"{quantity}_{w}" for quantity in ("wheel_speed", "drive_torque") for w in ("fl", "fr", "rl", "rr")
+    }
+    assert proposals.keys() == {*expected, "ground_speed"}
+    assert all(column.startswith(f"{robots[0]}/") for one in proposals.values() for column in one.columns)
+    text = profile_text("a log", None, proposals, since_1970=False, namespace=proposals.namespace)
+    other = yaml.safe_load(text.replace(f"namespace: {robots[0]}", f"namespace: {robots[1]}"))
+    assert other["namespace"] == robots[1]
+    sources = Profile.from_dict(other).sources - {"time"}
+    assert sources == {column for column in columns if column.startswith(f"{robots[1]}/")}
+
+
+def test_the_sides_of_one_machine_are_no_machines() -> None:
+    columns = {
+        f"/{side}/{axle}_wheel.speed": 5 * SPEED for side in ("left", "right") for axle in ("front", "rear")
+    }
+    proposals = _propose(columns)
+    assert proposals.namespace == ""
+    assert {f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")} <= proposals.keys()

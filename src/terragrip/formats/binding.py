@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,13 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             if len(origin.chain) > 1 or len(origin.candidates) > 1 or any("*" in c for c in origin.columns):
                 notes.append(f"{name} is from {', '.join(source.columns)}.")
     notes += _of_other_axes(channels.get("ground_speed"), log)
-    absent = [name for name in profile.channels if name not in channels]
+    if silent := efforts(channels) if _are_zero(efforts(channels).values(), log) else {}:
+        columns = ", ".join(source.columns[0] for source in silent.values())
+        notes.append(
+            f"{columns} hold nothing but 0, as drivers do that measure no torque: {', '.join(silent)} are left out."
+        )
+        channels = {name: source for name, source in channels.items() if name not in silent}
+    absent = [name for name in profile.channels if name not in channels and name not in silent]
     if absent and not partial:
         notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")
     time, remarks = _clock(profile.time, log)
@@ -68,6 +75,21 @@ def _chosen(name: str, origin: Source, log: LogTable, *, may_lack: bool) -> Sour
     lacking = next((c for c in every if not matching(c, log.columns)), every[0])
     several = len(origin.chain) > 1 or len(origin.candidates) > 1
     raise _missing(lacking, log, several_for=name if several else None)
+
+
+def efforts(channels: Mapping[str, Source]) -> dict[str, Source]:
+    """The drive torques that are a joint's effort in ROS, which a driver gives as 0 where it measures none."""
+    return {
+        name: source
+        for name, source in channels.items()
+        if name.startswith("drive_torque_") and any(".effort" in column for column in source.columns)
+    }
+
+
+def _are_zero(sources: Iterable[Source], log: LogTable) -> bool:
+    """Whether no column of some sources has a number other than 0."""
+    every = [log.columns[column] for source in sources for column in source.columns]
+    return all(values.dtype.kind in "fiu" and not np.nan_to_num(values).any() for values in every)
 
 
 def _as_spelt(profile: Profile, log: LogTable) -> Profile:

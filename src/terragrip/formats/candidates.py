@@ -63,14 +63,18 @@ _ABOUT = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 def columns_of(
-    numbers: Sequence[str], constants: Mapping[str, str], units: Mapping[str, str], vocabulary: Vocabulary
+    numbers: Sequence[str],
+    constants: Mapping[str, str],
+    units: Mapping[str, str],
+    vocabulary: Vocabulary,
+    namespace: str = "",
 ) -> dict[str, Column]:
-    """Every numeric column's name as read; ``constants`` are the texts that never change, by column."""
+    """Every numeric column's name as read, a machine's ``namespace`` left out; ``constants`` are the texts that never change, by column."""
     odometry = {_root(c) for c, text in constants.items() if "odometry" in vocabulary.read(text).concepts}
     alike, several = _numbered(numbers), _of_several(numbers)
     result = {}
     for column in numbers:
-        name, stated = vocabulary.read(column), units.get(column)
+        name, stated = vocabulary.read(column.removeprefix(namespace)), units.get(column)
         joint = _joint_of(column, constants)
         concepts = {*name.concepts, *vocabulary.read(joint).concepts}
         wheel = vocabulary.read(joint).wheel if joint else name.wheel

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
-from terragrip.formats.binding import bound
+from terragrip.formats.binding import bound, efforts
 from terragrip.formats.derivation import (
     derivative,
     fresh_positions,
@@ -137,7 +137,8 @@ def asked(profile: Profile, names: Iterable[str]) -> set[str]:
 def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None:
     """The profile bound to a log's columns, and notes, where every row of its recording follows from that row of the log alone.
 
-    None where it does not: of several sources the values tell which counts, derivatives look at rows beside, delays shift them.
+    None where it does not: of several sources the values tell which counts, and of efforts whether they do, derivatives look at rows
+    beside, delays shift them.
     Of the log only names are looked at. Raises InputError as `bound` does.
     """
     for origin in profile.channels.values():
@@ -145,7 +146,7 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
             return None
         if sum(_ways(one, log.names) for one in origin.chain) > 1:
             return None
-    if profile.rows is not None or profile.time.dates is not None:
+    if profile.rows is not None or profile.time.dates is not None or efforts(profile.channels):
         return None
     stub = np.zeros(1)
     return bound(profile, replace(log, columns=dict.fromkeys(log.names, stub)))

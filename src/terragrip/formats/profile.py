@@ -27,7 +27,7 @@ from __future__ import annotations
 import fnmatch
 import os
 import re
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
@@ -36,6 +36,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError, suggestion
 from terragrip.formats.conversion import convert
+from terragrip.formats.machines import inside, renamed
 from terragrip.formats.payload import Payload
 from terragrip.formats.profile_parts import Rows, Source, TimeSource, as_pattern, one_or_several, rate_unit
 from terragrip.recording import Recording
@@ -62,6 +63,7 @@ class Profile(Part):
 
     name: str = ""
     description: str = ""
+    namespace: str = ""  # of the one of several machines in a log whose columns are meant
     time: TimeSource = Field(default_factory=lambda: TimeSource.model_validate({}))
     rows: Rows | None = None
     payload: Payload | None = None  # of a live source's messages
@@ -93,6 +95,16 @@ class Profile(Part):
     def to_dict(self) -> dict[str, Any]:
         """The profile as `from_dict` accepts it, ready for JSON."""
         return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _inside_its_namespace(cls, data: Any) -> Any:
+        space = data.get("namespace") if isinstance(data, dict) else None
+        if not isinstance(space, str) or not space.strip("/"):
+            return data
+        space = "/" + space.strip("/")
+        named = {key: data[key] for key in ("time", "rows", "channels") if key in data}
+        return {**data, "namespace": space, **renamed(named, partial(inside, space))}
 
     @field_validator("channels", mode="before")
     @classmethod

@@ -12,6 +12,7 @@ import yaml
 
 from terragrip.errors import InputError
 from terragrip.formats.channel_proposal import Proposal
+from terragrip.formats.machines import renamed
 from terragrip.formats.profile import SHIPPED, Profile
 from terragrip.formats.profile_parts import Source, matching
 from terragrip.formats.signals import SignalLog
@@ -123,10 +124,19 @@ def profile_text(
     *,
     since_1970: bool,
     dbc: Sequence[str | os.PathLike[str]] = (),
+    namespace: str = "",
     head: str = "Proposed by 'terragrip inspect' for {}. Check every line; '?' marks a doubt.",
 ) -> str:
-    """A profile as YAML: loads as it stands, with a question mark where a line was guessed or lacks a number; ``head``: its first line."""
+    """A profile as YAML: loads as it stands, with a question mark where a line was guessed or lacks a number; ``head``: its first line.
+
+    ``namespace``: of the machine that is proposed, of several.
+    """
     lines = [f"# {head.format(file)}"]
+    columns = [column for proposal in proposals.values() for column in proposal.columns]
+    if not namespace or not all(column.startswith(f"{namespace}/") for column in columns):
+        namespace = ""  # what is beside the machines has no name inside one
+    else:
+        lines.append(f"namespace: {namespace}   # of one of several machines; names are inside it")
     if stamp is None:
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
     else:
@@ -139,7 +149,8 @@ def profile_text(
     for channel in sorted(proposals, key=_order):
         proposal = proposals[channel]
         remarks = "; ".join(filter(None, (proposal.doubt, proposal.give)))
-        lines.append(f"  {channel}: {_flow(proposal.entry)}" + f"   # ? {remarks}" * proposal.is_doubtful)
+        entry = renamed(proposal.entry, lambda name: name.removeprefix(namespace))
+        lines.append(f"  {channel}: {_flow(entry)}" + f"   # ? {remarks}" * proposal.is_doubtful)
     if not wheel_names_in(proposals) and "wheel_based_speed" not in proposals:
         lines.append("  # wheel_speed_fl: {from: ???, unit: rad/s}   # needed: one for each wheel")
     if "ground_speed" not in proposals:

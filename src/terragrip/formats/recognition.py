@@ -15,12 +15,12 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
 from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle, of_the_only_wheel
-from terragrip.formats.candidates import candidates_of, columns_of
+from terragrip.formats.candidates import Column, candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal, proposal_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.indirect import add_indirect, velocity_in_the_plane
 from terragrip.formats.judgement import Guess, Judge, varies
-from terragrip.formats.machines import of_one_machine, twins
+from terragrip.formats.machines import machines_among, namespace_of, without
 from terragrip.formats.rim_units import own_name
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.checks import PLACES
@@ -34,9 +34,10 @@ _OF_WHEELS = ("wheel_speed", "drive_torque")
 
 class Proposals(dict[str, Proposal]):
     """Proposals by channel; ``left_out``: sentences on speeds and places by name that the others contradict too clearly to be proposed,
-    and on torques of axles."""
+    and on torques of axles. ``namespace``: of the machine that they are of, where the log has several."""
 
     left_out: tuple[str, ...] = ()
+    namespace = ""
 
 
 def propose(
@@ -51,19 +52,43 @@ def propose(
 
     ``numbers`` are the columns (n,), ``texts`` the text columns, ``units`` those that the log states, ``clocks`` the instants [s] of
     each column (n,), without which nothing is held against time. The radii of a ``vehicle`` tell the unit of wheel speeds. Of several
-    machines (`of_one_machine`) the first is proposed.
+    machines (`machines_among`) the first is proposed.
     """
-    result = _proposed(numbers, texts, units, clocks, vocabulary, vehicle)
-    speeds = [result[channel].columns[0] for channel in rim_names(result)]
-    own, sentences = of_one_machine(numbers, [twins(column, numbers) for column in speeds])
-    if own == list(numbers):
-        return result
-    result = _proposed({name: numbers[name] for name in own}, texts, units, clocks, vocabulary, vehicle)
+    constants = _constants(texts) if isinstance(texts, Mapping) else {}
+    spaces: dict[str, list[str]] = {}
+    for name in numbers:
+        spaces.setdefault(namespace_of(name), []).append(name)
+    spaces.pop("", None)
+    rims = {
+        space: _rims(columns_of(own, constants, units, vocabulary, space), space)
+        for space, own in spaces.items()
+        if len(spaces) > 1
+    }
+    bare = {space: [name.removeprefix(space) for name in own] for space, own in spaces.items()}
+    home, *others = machines_among(bare, rims) or [""]
+    own, sentences = without(numbers, home, others)
+    result = _proposed(home, {name: numbers[name] for name in own}, texts, units, clocks, vocabulary, vehicle)
     result.left_out += tuple(sentences)
+    result.namespace = home
     return result
 
 
+def _rims(columns: Mapping[str, Column], namespace: str) -> list[str]:
+    """The names inside a namespace that are speeds of wheels on both sides, or of more than two, else those of a drive train."""
+    speeds: dict[str, str] = {}
+    for name, column in columns.items():
+        guess = next(iter(candidates_of(column)), None)
+        channel = "" if guess is None else guess.channel
+        of_an_axle = channel == "wheel_based_speed" and column.name.has("front", "rear")
+        if rim_names([channel]) and not of_an_axle:
+            speeds[name.removeprefix(namespace)] = channel
+    wheels = {name: channel for name, channel in speeds.items() if channel.startswith("wheel_speed_")}
+    both = {"l", "r"} <= {channel[-1] for channel in wheels.values()} or len(set(wheels.values())) > 2
+    return list(wheels) if both else [name for name in speeds if name not in wheels]
+
+
 def _proposed(
+    namespace: str,
     numbers: Mapping[str, Floats],
     texts: Texts | tuple[str, ...],
     units: Mapping[str, str],
@@ -71,11 +96,11 @@ def _proposed(
     vocabulary: Vocabulary,
     vehicle: Vehicle | None,
 ) -> Proposals:
-    """The proposals of all columns, whichever machine they are of."""
+    """The proposals of all columns, their names read inside a ``namespace``."""
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
     columns = {
         name: of_the_only_wheel(column, vehicle)
-        for name, column in columns_of(tuple(numbers), constants, units, vocabulary).items()
+        for name, column in columns_of(tuple(numbers), constants, units, vocabulary, namespace).items()
     }
     evidence = Evidence(numbers, clocks or {})
     plane = velocity_in_the_plane(columns, evidence)

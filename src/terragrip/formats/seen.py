@@ -112,7 +112,9 @@ class Seen:
         self, proposals: Proposals, dbc: Sequence[str | os.PathLike[str]] = (), file: str = "a log"
     ) -> str:
         """The profile of proposals, YAML."""
-        return profile_text(file, self.stamp, proposals, since_1970=self.since_1970, dbc=dbc)
+        return profile_text(
+            file, self.stamp, proposals, since_1970=self.since_1970, dbc=dbc, namespace=proposals.namespace
+        )
 
     def profile(self, proposals: Proposals) -> Profile:
         """That profile, loaded; raises InputError where it is none."""
