@@ -96,8 +96,9 @@ def true_estimates(estimates: Estimates, result: SimulationResult) -> Estimates:
 
 def shares_of(pairs: RunPairs) -> tuple[Floats, Floats]:
     """Mean slip and adhesion (shares,) of equal shares of the way, by pull; those of almost no slip are left out."""
-    good = np.isfinite(pairs.slip) & np.isfinite(pairs.adhesion) & (pairs.metres > 0)
-    slip, adhesion, pull, metres = (x[good] for x in (pairs.slip, pairs.adhesion, pairs.pull, pairs.metres))
+    pull, metres = (np.tile(x, pairs.wheels) for x in (pairs.pull, pairs.metres / pairs.wheels))
+    good = np.isfinite(pairs.slip) & np.isfinite(pairs.adhesion) & (metres > 0)
+    slip, adhesion, pull, metres = (x[good] for x in (pairs.slip, pairs.adhesion, pull, metres))
     if metres.sum() < LEAST_WAY:
         return np.empty(0), np.empty(0)
     order = np.argsort(pull, kind="stable")

@@ -130,7 +130,7 @@ def _of_table(
     labels = np.full(len(estimates), soil or "", dtype=object)
     if soil is None and "soil" in estimates.names:
         labels = np.asarray(estimates["soil"], dtype=object)
-    good = np.asarray(estimates["event"] == "")
+    good = estimates.during("")
     if (labels != labels[:1]).any():
         good &= settled(distance, labels, whole_length(vehicle)) | (labels == "")
     wheels = driven_wheels(estimates, vehicle)
@@ -139,9 +139,7 @@ def _of_table(
     share = load / load.sum(axis=1, keepdims=True)
 
     def mean(quantity: str) -> Floats:
-        return np.asarray(
-            (np.stack([estimates[quantity.format(w)] for w in wheels], axis=1) * share).sum(axis=1)
-        )
+        return np.asarray(sum(estimates[quantity.format(w)] * share[:, k] for k, w in enumerate(wheels)))
 
     slip, adhesion = mean("slip_{}"), mean("adhesion_{}")
     resistance, driven = estimates["soil_resistance"], load.sum(axis=1) / every

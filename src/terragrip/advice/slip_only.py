@@ -150,7 +150,7 @@ def slip_rows(estimates: Estimates) -> Rows:
     # not the median: channels on clocks of their own put several rows close together
     usual = float(np.quantile(step[step > 0], 0.9)) if (step > 0).any() else 0.0
     speed = np.abs(estimates["ground_speed"])
-    good = np.isfinite(slip) & (estimates["event"] == "") & (speed > LEAST_SPEED)
+    good = np.isfinite(slip) & estimates.during("") & (speed > LEAST_SPEED)
     seconds = np.minimum(step, 5 * usual)
     common = np.full(int(good.sum()), np.quantile(error[good], SUREST) if good.any() else 0.0)
     return slip[good], common, seconds[good], speed[good], fuel_rate_of(estimates)[good]

@@ -101,6 +101,10 @@ class Estimates:
             labels={name: values[rows] for name, values in self.labels.items()},
         )
 
+    def during(self, *kinds: str) -> npt.NDArray[np.bool_]:
+        """The rows (n,) whose event is one of ``kinds``; "" is none. Raises ValueError on a kind that there is not."""
+        return np.isin(self.event_codes, [EVENTS.index(kind) for kind in kinds])
+
     @property
     def wheels(self) -> tuple[str, ...]:
         """Names of the wheels, in the vehicle's order."""

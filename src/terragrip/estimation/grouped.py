@@ -50,7 +50,7 @@ def summary_by(estimates: Estimates, by: str) -> pd.DataFrame:
         raise InputError(f"there is no label {by!r} to sum up by", hint=f"take one of {', '.join(texts)}")
     labels, calm = estimates[by], estimates.event_codes == 0
     seconds = np.diff(estimates.time, append=estimates.time[-1:])
-    seconds[estimates["event"] == "gap"] = 0.0
+    seconds[estimates.during("gap")] = 0.0
     metres = (
         np.diff(estimates["distance"], append=estimates["distance"][-1:]) if "distance" in estimates else None
     )

@@ -119,6 +119,7 @@ class MapMaker:
         for reading in readings_of(estimates, places, self._slip, self.library):
             pieces = pieces_of(reading, estimates.time, way, self._cell, number, places.headland)
             self._parts.setdefault(reading.quantity, []).append(pieces)
+            del reading  # before the next one is made
         self._soil.append(soil_way(estimates, places, way, self._cell, self.ground.get(run, [])))
         self._points.append(points_of(estimates, places, way, self._cell, number))
 

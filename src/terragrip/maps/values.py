@@ -80,7 +80,7 @@ def usual_slip(estimates: Estimates) -> float:
 
 def driven_slip(estimates: Estimates) -> float:
     """The slip [-] at which the driven wheels worked, in the median of their way; NaN where no row shows it."""
-    counted = np.isin(estimates["event"].astype(str), COUNTED)
+    counted = estimates.during(*COUNTED)
     step = np.diff(np.maximum.accumulate(np.nan_to_num(estimates["distance"])), prepend=0.0)
     wheels = [estimates[f"slip_{wheel}"] for _, wheel, _, _ in _driven(estimates, estimates.vehicle)]
     slip, metres = np.concatenate([[], *wheels]), np.tile(np.where(counted, step, 0.0), len(wheels))
@@ -95,7 +95,7 @@ def readings_of(
 ) -> Iterator[Reading]:
     """The readings of one run: adhesion, slip, efficiency of each driven wheel at its place, soil resistance at the wheels' middle."""
     vehicle = estimates.vehicle
-    counted = np.isin(estimates["event"].astype(str), COUNTED)
+    counted = estimates.during(*COUNTED)
     form = _form(estimates, reference_slip, library)
     stated = vehicle.uncertainty
     radius = (stated.wheel_radius or 0.0) if estimates.has_adhesion else stated.assumed("wheel_radius")

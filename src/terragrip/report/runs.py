@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -214,7 +215,10 @@ class Run:
         """
         for table in (self.estimates, self.recording, self.truth):
             if table is not None and "soil" in table:
-                labels = [x if isinstance(x, str) else "" for x in table["soil"].to_numpy(dtype=object)]
+                # Interned: a table of texts gives each row an object of its own.
+                labels = [
+                    sys.intern(x) if isinstance(x, str) else "" for x in table["soil"].to_numpy(dtype=object)
+                ]
                 result = np.array(labels, dtype=object)
                 if self.truth is not None and "transition" in self.truth:
                     result[self.truth["transition"].to_numpy(dtype=np.bool_)] = ""

@@ -222,7 +222,7 @@ def estimates_blocks(estimates: Estimates, rows: Bools | None = None, file: str 
         )
     columns = {name: estimates[name] for name in estimates.names}
     if rows is not None:
-        columns["event"] = np.where(rows, columns["event"], "gap")
+        columns["event"][~rows] = "gap"
     return blocks_of(columns, driven_wheels(estimates.vehicle), file=file)
 
 

@@ -40,10 +40,9 @@ FALL = 0.05
 
 @dataclass(frozen=True)
 class RunPairs:
-    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; the vehicle's pull, the mean
-    adhesion of its wheels, at that instant (n,); the stretch of `STRETCH` metres of each pair, and the metres of the vehicle's path that
-    it represents, divided among a row's wheels (n,); rho_s and speed (rows,). ``roll``: metres that a wheel rolls until its adhesion has
-    followed its slip."""
+    """The usable pairs of one run on one soil: slip, adhesion and slip noise (n,), wheel after wheel; by row (rows,) the vehicle's pull,
+    the mean adhesion of its wheels; the stretch of `STRETCH` metres; the metres of its path; rho_s and speed. ``roll``: metres that a
+    wheel rolls until its adhesion has followed its slip."""
 
     run: str
     soil: str
@@ -58,11 +57,15 @@ class RunPairs:
     roll: float = 0.0
 
     @property
+    def wheels(self) -> int:
+        """The wheels of each row."""
+        return self.slip.size // max(self.resistance.size, 1)
+
+    @property
     def steady(self) -> RunPairs:
         """The pairs as means over `roll` metres of the path around each; slip's noise in them by rows of which `ALIKE` is common."""
-        rows = self.resistance.size
-        step = self.metres.reshape(-1, rows) * (self.metres.size / rows)
-        way = np.cumsum(step[0]) - step[0] / 2
+        rows, step = self.resistance.size, self.metres
+        way = np.cumsum(step) - step / 2
         first, last = (np.searchsorted(way, way + end) for end in (-self.roll / 2, self.roll / 2))
         last = np.maximum(last, np.arange(rows) + 1)
 
@@ -74,7 +77,7 @@ class RunPairs:
             own = values.reshape(-1, rows)
             return np.where(known & (way > 0), total / np.where(way > 0, way, 1.0), own).ravel()
 
-        share = ALIKE + (1 - ALIKE) / np.tile(last - first, self.slip.size // rows)
+        share = ALIKE + (1 - ALIKE) / np.tile(last - first, self.wheels)
         slip, adhesion, pull = (mean(values) for values in (self.slip, self.adhesion, self.pull))
         return replace(self, slip=slip, adhesion=adhesion, pull=pull, slip_std=self.slip_std * np.sqrt(share))
 
@@ -151,9 +154,9 @@ def usable_pairs(
                 slip.ravel(),
                 adhesion.ravel(),
                 noise.ravel(),
-                np.tile(adhesion.mean(axis=0), len(wheels)),
-                np.tile(stretch, len(wheels)),
-                np.tile(steps[rows] / len(wheels), len(wheels)),
+                adhesion.mean(axis=0),
+                stretch,
+                steps[rows],
                 np.asarray(columns["soil_resistance"], dtype=float)[rows],
                 np.asarray(columns["ground_speed"], dtype=float)[rows],
                 roll,
@@ -223,7 +226,7 @@ def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
     run = np.repeat(np.arange(len(parts)), [part.slip.size for part in parts])
     if len(parts) >= FEW_RUNS:
         return run
-    stretch = np.concatenate([part.stretch for part in parts])
+    stretch = np.concatenate([np.tile(part.stretch, part.wheels) for part in parts])
     return np.asarray(run * (np.ptp(stretch) + 1) + stretch - stretch.min())
 
 
@@ -231,10 +234,10 @@ def bin_parts(parts: Sequence[RunPairs], settings: BinSettings) -> Bins:
     """Bins of one soil's pairs, with the clusters that the bootstrap draws: runs, or stretches of runs where there are few."""
     cluster = _clusters(parts)
     parts = [part.steady for part in parts] if settings.by == BY_PULL else parts
-    slip, adhesion, pull, metres, noise = (
-        _joined(parts, name) for name in ("slip", "adhesion", "pull", "metres", "slip_std")
-    )
+    slip, adhesion, noise = (_joined(parts, name) for name in ("slip", "adhesion", "slip_std"))
     if settings.by == BY_PULL:
+        pull = np.concatenate([np.tile(part.pull, part.wheels) for part in parts])
+        metres = np.concatenate([np.tile(part.metres / part.wheels, part.wheels) for part in parts])
         return bin_by_pull(slip, adhesion, pull, metres, cluster, settings, noise)
     return bin_pairs(slip, adhesion, cluster, settings)
 
