@@ -14,7 +14,7 @@ from terragrip.cli import main
 from terragrip.estimation import Estimates
 from terragrip.report import soil_sections
 from terragrip.report.from_estimates import report_of
-from terragrip.report.page import Page, Section, number
+from terragrip.report.page import Page, Section, Table, number
 from terragrip.soil.library import Soil, SoilLibrary
 
 
@@ -91,6 +91,22 @@ def test_a_library_given_is_what_is_shown(
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "0.777" in html
     assert "hard: not fitted, the library does not contain it" in html
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("soil", "is_drawn"), [("grass", True), ("fine", False)])
+def test_a_run_on_a_soil_that_the_other_lacks_is_drawn_beside_it(
+    tmp_path: Path, soil: str, is_drawn: bool
+) -> None:
+    """The second run, of one soil, had no place over time nor among the operating points, whatever its soil."""
+    made_up.estimates(1, ("hard", "fine"), rows=400).write(tmp_path / "a.parquet")
+    made_up.estimates(2, (soil,), rows=400).write(tmp_path / "b.parquet")
+    page = report_of([tmp_path / "a.parquet", tmp_path / "b.parquet"])
+    anchors = {section.anchor for section in page.sections if section is not None}
+    assert ("tracking-b" in anchors, "wheels-b" in anchors) == (is_drawn, is_drawn)
+    (points,) = (section for section in page.sections if section is not None and section.anchor == "soils")
+    rows = {row[0] for table in points.content if isinstance(table, Table) for row in table.rows}
+    assert rows == {"hard", "fine", *([soil] if is_drawn else [])}
 
 
 @pytest.mark.usefixtures("undrawn")

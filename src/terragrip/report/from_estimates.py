@@ -191,8 +191,8 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
             kept = sorted([*kept, (worth, run)], key=lambda one: one[0], reverse=True)[:SHOWN]
         read.missing += [one for one in _lacks(run) if one not in read.missing]
         step(number_)
-    if kept and len(kept) == SHOWN and kept[1][0][0] < 2 <= kept[0][0][0]:
-        kept = kept[:1]  # a run on one soil says nothing beside one over several
+    if len(kept) == SHOWN and kept[1][0][0] < 2 and set(kept[1][1].soils) < set(kept[0][1].soils):
+        kept = kept[:1]  # a run on one soil says nothing beside one over that and others
     read.shown = [run for _, run in kept]
     return read
 
