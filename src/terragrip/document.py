@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from terragrip.errors import InputError, suggestion
-from terragrip.files import refuse_missing, unreadable
+from terragrip.files import path_of, refuse_missing, unreadable
 from terragrip.units import UnitError
 
 Place = tuple[str | int, ...]
@@ -79,7 +79,7 @@ class Document:
 
 def read_yaml(path: str | os.PathLike[str]) -> Document:
     """Read a YAML mapping; raises InputError if it is missing, not YAML, not a mapping, or repeats a key."""
-    file = os.fspath(path)
+    file = path_of(path, "give the path of a file; its content as a dict is for from_dict(...)")
     text = _read_text(file)
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(text)
     try:

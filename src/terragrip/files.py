@@ -141,6 +141,13 @@ def unwritable(path: str | os.PathLike[str], error: Exception, hint: str) -> Inp
     )
 
 
+def path_of(path: object, otherwise: str = "give the path of a file") -> str:
+    """A path as text; raises InputError, with ``otherwise`` as its hint, if it is none."""
+    if isinstance(path, str | os.PathLike):
+        return os.fspath(path)
+    raise InputError(f"{type(path).__name__} is no path", hint=otherwise)
+
+
 def refuse_missing(path: str | os.PathLike[str], *, suffixes: tuple[str, ...] = ()) -> None:
     """Raise InputError if ``path`` is no file; names the nearest one, or one of ``suffixes`` in a folder."""
     target = Path(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,9 @@ from terragrip.errors import InputError
 from terragrip.estimation import Estimates, estimate, estimated
 from terragrip.estimation.export import KINDS
 from terragrip.estimation.writing import write_parts
+from terragrip.formats import Profile
 from terragrip.recording import LogBlocks, Recording
+from terragrip.vehicle import Vehicle
 
 
 def labelled(seconds: float = 8.0) -> Recording:
@@ -193,3 +196,29 @@ def test_paths_in_place_of_a_log_and_a_vehicle_are_told_what_to_give() -> None:
         estimate(labelled(2.0), "robot.yaml")  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"str is not a table; give what tg\.read\(path\) returns"):
         estimate("log.csv", robot())
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ({"sensors": {"ground_speed": "0.1 m/s"}}, "the noise of ground_speed is '0.1 m/s'; give a positive"),
+        ({"sensors": {"ground_speed": None}}, "the noise of ground_speed is None; give a positive"),
+        ({"gap": -1}, "gap is -1; give a positive number of seconds"),
+        ({"gap": "1 s"}, "gap is '1 s'; give a positive number of seconds"),
+        ({"standstill_speed": np.nan}, "standstill_speed is nan; give a positive number of m/s"),
+        ({"held": {"ground_speed": "0.2 s"}}, "held of ground_speed is '0.2 s'; give the period"),
+        ({"held": {"ground": 0.2}}, "held names 'ground', which is no channel"),
+        ({"method": None}, "there is no method 'None'; choose one of"),
+    ],
+)
+def test_a_setting_that_cannot_be_used_is_one_line(words: dict[str, object], expected: str) -> None:
+    """It was a TypeError, blamed on the vehicle file, or ignored."""
+    with pytest.raises(InputError, match=expected):
+        estimate(labelled(2.0), robot(), **words)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("reader", [Vehicle.load, Profile.load, Estimates.read])
+def test_what_is_no_path_is_named(reader: Callable[[object], object]) -> None:
+    for wrong in ({"mass": 1.0}, None):
+        with pytest.raises(InputError, match=rf"{type(wrong).__name__} is no path; give the path of a"):
+            reader(wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from pathlib import Path
 
@@ -126,6 +127,8 @@ def test_tables_in_memory_are_sources_too() -> None:
     for wrong in (speed["kmh"], [wheels, 7], None):
         with pytest.raises(InputError, match="is no log; give a path, a DataFrame or a dict of arrays"):
             tg.read(wrong)
+    with pytest.raises(InputError, match="BytesIO is no log; give a path"):  # it was its first line, 'bytes'
+        tg.read(io.BytesIO(b"time,ground_speed\n"))
 
 
 def test_a_file_that_goes_on_where_another_ends_is_refused(tmp_path: Path) -> None:

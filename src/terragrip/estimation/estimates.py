@@ -145,7 +145,8 @@ class Estimates:
     def to_pandas(self) -> pd.DataFrame:
         """The whole table as a pandas DataFrame; ``event`` and labels are text.
 
-        Its index is the clock time (UTC) where the log has one, else the row's number. ``attrs`` has ``units`` and ``descriptions``
+        Its index is the clock time (UTC) where the log has one, else the row's number; beside rows of another table put arrays,
+        ``table["slip"] = estimates["slip_rr"]``, since pandas places a Series by its index. ``attrs`` has ``units`` and ``descriptions``
         by column, ``notes``, and the content of `about`.
         """
         import pandas as pd
@@ -296,8 +297,9 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
     """The result of ``reading`` on a Parquet file; raises InputError if it is missing, damaged or not a Parquet file."""
     import pyarrow as pa
 
-    from terragrip.files import refuse_missing, unreadable
+    from terragrip.files import path_of, refuse_missing, unreadable
 
+    path = path_of(path)
     refuse_missing(path, suffixes=(".parquet",))
     try:
         return reading(os.fspath(path))

@@ -13,7 +13,7 @@ from terragrip.errors import InputError, nearest
 from terragrip.estimation import rims as speeds
 from terragrip.estimation.engine import EVENTS, Engine, estimate_slots, refusal
 from terragrip.estimation.methods import DEFAULT, SLIP_ONLY, method_named
-from terragrip.estimation.noise import DELAY, channel_noise, settings_in
+from terragrip.estimation.noise import DELAY, channel_noise, check_held, settings_in
 from terragrip.estimation.rims import Rim, rims_of, speeds_alone
 from terragrip.estimation.sealed import seal, understood, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
@@ -117,6 +117,7 @@ class TractionEstimator:
         self.vehicle = vehicle
         self.method = method_named(method).name
         self.held = dict(held or {})
+        check_held(self.held)
         self.dead_band = dead_band
         self.channels = default_channels(vehicle) if channels is None else tuple(channels)
         self.thresholds = Thresholds(gap=gap, standstill_speed=standstill_speed, together=together)

@@ -70,6 +70,7 @@ SLIP_ONLY = Method(
 
 def method_named(name: str, *, smooth: bool = False) -> Method:
     """The method of that name; raises InputError, which names the nearest one, or if it cannot ``smooth``."""
+    name = str(name)
     if name in METHODS:
         if smooth and not METHODS[name].can_smooth:
             hint = "use another method, or leave out smooth"

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from numbers import Real
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from terragrip.errors import InputError, suggestion
 from terragrip.physics.loads import GRAVITY
+from terragrip.recording.schema import is_channel
 
 if TYPE_CHECKING:
     from terragrip.recording import Recording
@@ -106,15 +106,32 @@ def sensor_of(channel: str) -> str:
     return _SENSOR_OF.get(channel, channel)
 
 
+def is_positive(value: object) -> bool:
+    """Whether a value is a number above 0, and finite."""
+    return isinstance(value, Real) and 0 < float(value) < math.inf
+
+
 def _check(given: Mapping[str, float], channels: tuple[str, ...]) -> None:
     known = {*channels, *(sensor_of(name) for name in channels), DELAY}
     for name, value in given.items():
         if name not in known:
             hint = suggestion(name, known, "name a channel")
             raise InputError(f"there is no sensor {name!r}", hint=hint)
-        if not (np.isfinite(value) and (value > 0 or (name == DELAY and value == 0))):
+        if not (is_positive(value) or (name == DELAY and value == 0)):
             raise InputError(
                 f"the noise of {name} is {value!r}", hint="give a positive standard deviation in SI"
+            )
+
+
+def check_held(held: Mapping[str, float]) -> None:
+    """Raise InputError unless the keys are channels and the values periods."""
+    for name, period in held.items():
+        if not is_channel(name):
+            hint = "name a channel, as ground_speed"
+            raise InputError(f"held names {name!r}, which is no channel", hint=hint)
+        if not is_positive(period):
+            raise InputError(
+                f"held of {name} is {period!r}", hint="give the period of its updates in seconds"
             )
 
 

@@ -13,7 +13,7 @@ from terragrip._kernel import ffi, lib
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
-from terragrip.estimation.noise import DELAY
+from terragrip.estimation.noise import DELAY, is_positive
 from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.recording.checks import require_hitch
@@ -28,6 +28,14 @@ class Thresholds:
     gap: float | None = None
     standstill_speed: float | None = None
     together: int = 1  # wheels that each wheel of the vehicle represents
+
+    def __post_init__(self) -> None:
+        for name, unit in (("gap", "seconds"), ("standstill_speed", "m/s")):
+            value = getattr(self, name)
+            if value is not None and not is_positive(value):
+                raise InputError(
+                    f"{name} is {value!r}", hint=f"give a positive number of {unit}, or leave it out"
+                )
 
     def put(self, settings: Any) -> None:
         """Write the user's settings into a tg_settings."""

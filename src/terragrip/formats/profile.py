@@ -35,6 +35,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError, suggestion
+from terragrip.files import path_of
 from terragrip.formats.conversion import convert
 from terragrip.formats.machines import inside, renamed
 from terragrip.formats.payload import Payload
@@ -76,13 +77,13 @@ class Profile(Part):
 
         Raises InputError with the file, the key, its line and the fix.
         """
+        path = path_of(path, "give the path of a profile; its content as a dict is for from_dict(...)")
         own = Path(__file__).with_name("profiles") / f"{path}.yaml"
-        if os.fspath(path) in SHIPPED and not Path(path).is_file():
+        if path in SHIPPED and not Path(path).is_file():
             return validate(cls, read_yaml(own))
-        name = os.fspath(path)
         if not Path(path).exists() and Path(path).parent == Path() and not Path(path).suffix:
-            hint = suggestion(name, SHIPPED, f"those are {', '.join(SHIPPED)}")
-            raise InputError(f"{name!r} is neither a file nor a profile that comes with Terragrip", hint=hint)
+            hint = suggestion(path, SHIPPED, f"those are {', '.join(SHIPPED)}")
+            raise InputError(f"{path!r} is neither a file nor a profile that comes with Terragrip", hint=hint)
         result = validate(cls, read_yaml(path))
         databases = tuple(os.fspath(Path(path).parent / name) for name in result.dbc)
         return result.model_copy(update={"dbc": databases} if databases else {})

@@ -55,7 +55,8 @@ def read(
     if not isinstance(path, str | os.PathLike):
         from terragrip.formats.sources import merged
 
-        paths: list[Any] = list(path) if hasattr(path, "__iter__") else [path]
+        several = hasattr(path, "__iter__") and not (isinstance(path, bytes) or hasattr(path, "read"))
+        paths: list[Any] = list(path) if several else [path]
         chosen_ones = _each(profile, paths)
         for number, one in enumerate(paths, 1):
             if _is_table(one):
