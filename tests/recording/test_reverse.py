@@ -99,6 +99,23 @@ def test_speeds_without_a_sign_are_named_by_the_gyroscope() -> None:
     assert said({name: v for name, v in both.items() if name != "angular_velocity_z"}) == ""
 
 
+def test_two_minutes_in_reverse_without_signs_are_no_wheel_that_goes_too_slowly() -> None:
+    """Its turns made wheels that pull slower than their hubs: "write where the antenna is" was the only advice."""
+    draws, back = np.random.default_rng(0), (TIME > 100) & (TIME < 220)
+    speed = np.where(back, -1.0, 1.0) * (1.0 + 0.2 * np.sin(TIME / 9))
+    course = np.sin(2 * np.pi * TIME / 30)
+    turn = 0.3 * course * (np.abs(course) > 0.5)
+    columns = {"time": TIME, "ground_speed": np.abs(speed), "angular_velocity_z": turn}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        hub = speed + (-1 if wheel.endswith("l") else 1) * TRACK / 2 * turn
+        columns[f"wheel_speed_{wheel}"] = np.abs(hub) / 0.95 / RADIUS
+        columns[f"drive_torque_{wheel}"] = 31 + 9 * np.gradient(np.abs(speed), TIME)
+    noise = {"time": 0.0, "ground_speed": 0.01, "angular_velocity_z": 0.01}
+    columns = {n: v + noise.get(n, 0.02) * draws.standard_normal(len(TIME)) for n, v in columns.items()}
+    (note,) = unit_warnings(Recording.from_frame(columns), machine())
+    assert "of the turns angular_velocity_z contradicts the wheels' speeds: if these have no sign" in note
+
+
 WHEELS = tuple(f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr"))
 
 

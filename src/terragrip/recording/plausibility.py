@@ -161,13 +161,14 @@ _TIME = ("clock",)
 """Every other check is by time,"""
 _WAY = (*_TIME, "against")
 """and takes it that rims and ground go one way."""
-_SPEEDS = (*_WAY, "rescaled", "sides", "rims", "free axles")
+_SPEEDS = (*_WAY, "reverse", "rescaled", "sides", "rims", "free axles")
 _COURSES = (*_SPEEDS, "positions")
 _FORCES = (*_WAY, "signs", "uneven torques", "motion", "acceleration", "zeros", "leaps")
 
 _EACH = (
     Check("clock", lambda log: clock_warnings(log.whole, log.vehicle)),
     Check("against", lambda log: against_warnings(log.rows), _TIME, needs_wheels=False),
+    Check("reverse", lambda log: reverse_warnings(log.rows, log.vehicle), (*_WAY, "exchanged wheels")),
     Check("rims", lambda log: rim_warnings(log.rows, log.vehicle), (*_WAY, "sides")),
     Check("free axles", lambda log: free_axle_warnings(log.rows, log.vehicle), (*_WAY, "sides", "rims")),
     Check(
@@ -221,7 +222,7 @@ _EACH = (
     Check(
         "motion",
         lambda log: motion_warnings(log.rows, log.any_vehicle, log.means_of_even_torques),
-        (*_WAY, "signs"),
+        (*_WAY, "reverse", "signs"),
         needs_wheels=False,
     ),
     Check(
@@ -269,16 +270,11 @@ _EACH = (
 )
 _ALL = tuple(check.name for check in _EACH)
 _ELSE = (
-    Check("reverse", lambda log: reverse_warnings(log.rows, log.vehicle), _ALL),
-    Check(
-        "exchanged torques",
-        lambda log: exchanged_torques(log.rows, log.vehicle, log.turn),
-        (*_ALL, "reverse"),
-    ),
+    Check("exchanged torques", lambda log: exchanged_torques(log.rows, log.vehicle, log.turn), _ALL),
     Check(
         "axles",
         lambda log: axle_warnings(log.rows, log.vehicle, log.means),
-        (*_ALL, "reverse", "exchanged torques"),
+        (*_ALL, "exchanged torques"),
     ),
 )
 """Their symptoms are those of other mistakes, too."""
