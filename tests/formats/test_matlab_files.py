@@ -247,13 +247,18 @@ def test_labels_of_a_categorical_and_of_a_tables_column_are_read() -> None:
 
 
 @pytest.mark.parametrize("version", ["5", "7.3"])
-@pytest.mark.parametrize("channel", ["ground_speed", "wheel_speed_r"])
-def test_a_channel_one_sample_shorter_than_time_is_refused(
-    tmp_path: Path, version: str, channel: str
+@pytest.mark.parametrize(
+    ("channel", "length"), [("ground_speed", 199), ("wheel_speed_r", 199), ("drawbar_force", 40)]
+)
+def test_a_channel_of_another_length_than_time_is_refused(
+    tmp_path: Path, version: str, channel: str, length: int
 ) -> None:
     """It was 'missing', and a torque or a pull was none, with a note."""
-    path = saved(tmp_path / "log.mat", version, {"t": TIME, **OURS, channel: SPEED[:-1]})
-    with pytest.raises(InputError, match=f"signal {channel}: has 199 samples, and the time vector beside it"):
+    content = {"t": TIME, **OURS, channel: SPEED[:length], "gains": np.ones(3)}
+    path = saved(tmp_path / "log.mat", version, content)
+    with pytest.raises(
+        InputError, match=f"signal {channel}: has {length} samples, and the time vector besid"
+    ):
         read(path)
 
 

@@ -15,6 +15,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.recording import Recording
+from terragrip.recording.frames import frame_of
 
 KMH = np.array([3.6, np.nan, 7.2])
 LOG = pd.DataFrame({"time": [0.0, 0.1, 0.2], "ground_speed": KMH, "wheel_speed_l": [5.0, 6.0, 7.0]})
@@ -112,6 +113,24 @@ def test_an_index_of_several_levels_gives_time_and_label() -> None:
     got = Recording.from_frame(log.set_index(["soil", "time [ms]"]))
     np.testing.assert_allclose(got.time, LOG["time"])
     assert set(got["soil"]) == {"grass"}
+
+
+def test_an_index_of_dates_is_time_and_has_its_own_name_too() -> None:
+    """A profile with 'time: {from: when}' had no such column."""
+    index = pd.DatetimeIndex(
+        pd.Timestamp("2026-05-11", tz=UTC) + pd.to_timedelta(LOG["time"], unit="s"), name="when"
+    )
+    log = LOG.drop(columns="time").set_index(index)
+    columns = frame_of(log, None).columns
+    np.testing.assert_array_equal(columns["when"], columns["time"])
+    assert "when" not in log
+
+
+def test_series_of_unlike_indices_are_taken_by_place_with_a_note() -> None:
+    later = LOG.set_index(pd.RangeIndex(5, 8))
+    assert not any("indices" in note for note in frame_of(dict(later), None).notes)
+    mixed = {**LOG, "ground_speed": later["ground_speed"]}
+    assert any("rows are taken by their place" in note for note in frame_of(mixed, None).notes)
 
 
 def test_names_of_several_levels_are_refused_with_the_way_out() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.matlab_values import Array, Opaque, read_array, texts_of
-from terragrip.recording.schema import LABELS
+from terragrip.recording.schema import LABELS, is_own
 from terragrip.units import UnitError, factor_to, is_common
 
 _TIMES = ("time", "t", "tout", "timestamp", "time_s", "t_s", "time_ms", "t_ms", "time_us", "time_ns")
@@ -157,8 +157,8 @@ def _add_those_beside(
             stated = _value(struct, _UNITS) if plain else None
             unit = stated if isinstance(stated, str) and is_common(stated) else units.get(key)
             _add(contents, name if plain else _joined(name, key), clocks[length], part, length, unit)
-        elif max(part.shape) > first / 2 and (texts is not None or _is_vector(part)):
-            # shorter ones are parameters
+        elif (max(part.shape) > first / 2 or is_own(key)) and (texts is not None or _is_vector(part)):
+            # shorter ones of other names are parameters
             contents.odd[_joined(name, key)] = max(part.shape), first
 
 

@@ -39,7 +39,12 @@ def frame_of(table: Any, source: str | None) -> Frame:
     beside = {name: stated[whole] for whole, name in zip(columns, names, strict=True) if whole in stated}
     beside = {name: unit for name, unit in beside.items() if unit and name not in behind}
     foreign = [f"{n} in {u}" for n, u in beside.items() if _is_foreign(n, u)]
-    notes = (f"Units by the table's attributes: {', '.join(foreign)}.",) if foreign else ()
+    notes: tuple[str, ...] = (f"Units by the table's attributes: {', '.join(foreign)}.",) if foreign else ()
+    indices = (
+        [one.index for one in table.values() if hasattr(one, "iloc")] if isinstance(table, Mapping) else []
+    )
+    if any(not one.equals(indices[0]) for one in indices):
+        notes += ("The indices of the table's Series differ: rows are taken by their place, not by index.",)
     return Frame(dict(zip(names, columns.values(), strict=True)), {**beside, **behind}, notes)
 
 
@@ -131,6 +136,8 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
             raise InputError("has names of several levels", file=source, hint=hint)
         index = frame.index
         if TIME not in frame.columns and index.nlevels == 1 and index.dtype.kind in "mM":
+            if index.name not in (None, TIME, *frame.columns):  # a profile may name it as it is called
+                frame = frame.assign(**{str(index.name): index})
             frame = frame.rename_axis(TIME)
         if TIME not in frame.columns:
             levels = [str(name) for name in frame.index.names]
