@@ -130,7 +130,7 @@ def _mostly(leaps: Bools, there: Bools) -> bool:
 def _used_in(values: Floats) -> Floats:
     """Those of a channel's values (n,) that loggers use as codes: -1, or one of `_USED` by any decimal scale, in km/h, too."""
     scaled = np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], _USED)).ravel()
-    ordered = np.sort(np.r_[-1.0, scaled])
-    place = np.clip(np.searchsorted(ordered, values), 1, len(ordered) - 1)
-    near = np.minimum(np.abs(values - ordered[place]), np.abs(values - ordered[place - 1]))
-    return np.unique(values[near < 1e-9 * np.abs(values)])
+    codes, ordered = np.r_[-1.0, scaled], np.sort(values)
+    near = 1e-9 * np.abs(codes)
+    first, last = np.searchsorted(ordered, codes - near), np.searchsorted(ordered, codes + near)
+    return np.unique(np.concatenate([ordered[i:j] for i, j in zip(first, last, strict=True)]))

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part, quantum
@@ -138,7 +137,8 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
     # Held between values that are too far apart.
     if len(what) < 6 or not len(updates) or median(updates) > _SLOWEST:
         return result
-    calm = np.median(sliding_window_view(what, 3), axis=1)
+    low, high = np.minimum(what[:-2], what[1:-1]), np.maximum(what[:-2], what[1:-1])
+    calm = np.maximum(low, np.minimum(high, what[2:]))  # the median of three
     leaps = calm[3:] - calm[:-3]
     rows = (np.abs(leaps) > _SURE * MAD_TO_SD * median(np.abs(leaps))) & (np.diff(when)[2:-2] <= _SLOWEST)
     rows &= np.abs(steps[2:-2] - leaps) < _HALF * np.abs(leaps)

@@ -134,7 +134,8 @@ def _is_written_as_hhmmss(time: Floats, spacing: float) -> bool:
     """Whether the last two digits before the point never reach 60, but go on from 59 to the next hundred."""
     if not (time[0] >= 0 and time[-1] < 240000):
         return False
-    digits, hundreds = time % 100, time // 100
+    hundreds = np.floor(time / 100)
+    digits = time - 100 * hundreds
     change = np.flatnonzero(np.diff(hundreds))
     near = max(3 * spacing, 1.0)
     goes_on = (digits[change] >= 60 - near) & (digits[change + 1] < near)
