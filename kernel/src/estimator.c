@@ -269,53 +269,69 @@ static tg_real speed_of_hubs(const tg_estimator *e)
     return speed / (tg_real)n;
 }
 
+static tg_status accept(tg_estimator *e, const tg_sample *sample, tg_row *row)
+{
+    if (isnan(sample->time) || isinf(sample->time)) return TG_NOT_FINITE;
+    if (e->started && !(sample->time > e->time)) return TG_TIME_REVERSED;
+    return tgi_clean(e, sample, row);
+}
+
+/* Which outputs a row writes depends on the settings alone: NaN stays in those that this vehicle or method does not have. */
+static void blank(tg_estimate *out)
+{
+    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN;
+}
+
+static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, tg_estimate *out)
+{
+    if (e->settings.method == TG_SPEEDS) {
+        tgi_speeds_update(e, row, out);
+        return;
+    }
+
+    tg_drive drive;
+    tg_input now;
+    int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
+    tg_real dt = e->started ? (tg_real)(row->time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
+    tgi_doubt_speeds(e, row, dt);
+    tgi_watch_shares(e, sample);
+    int32_t turned = tgi_track_motion(e, row);
+    if (turned) mirror(&e->held, n);
+    tgi_track_turn(e, row);
+    tg_real q[TG_MAX_STATES];
+    tgi_update_inputs(e, row, dt, &drive);
+    tgi_input_noise(e, &drive, dt, row, q);
+    tgi_loads(e, row, &drive);
+    tgi_along(e, &drive, &now);
+    tg_course course = course_of(e, row, was_standing, turned, &gap);
+    if (!e->started) e->ground_time = row->time;
+    tgi_reckon(e, &drive, dt, course == TG_GO, row, q);
+    if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, row);
+    report_adaptation(e, out->value);
+    const int32_t lost = !go_on(e, row, &drive, &now, course, dt, q), breaks = gap || lost;
+    balance_forces(e, &drive, row->time);
+    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
+    if (course == TG_GO && !row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
+
+    if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
+    tgi_end_row(e, row, out);
+    e->held = now;
+    report(e, row, &drive, out);
+    const int32_t blind = is_blind(e, row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
+    tgi_watch_over(e, row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
+    out->event = tgi_event_of(e, row, gap || blind || course == TG_WAIT, lost);
+    const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
+    tgi_curves(e, course == TG_GO && learn && !row->outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
+}
+
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)
 {
     if (!e || !sample || !out) return TG_BAD_ARGUMENT;
-    if (isnan(sample->time) || isinf(sample->time)) return TG_NOT_FINITE;
-    if (e->started && !(sample->time > e->time)) return TG_TIME_REVERSED;
     tg_row row;
-    tg_drive drive;
-    tg_input now;
-    tg_status status = tgi_clean(e, sample, &row);
+    const tg_status status = accept(e, sample, &row);
     if (status != TG_OK) return status;
-    for (int32_t k = 0; k < TG_OUT_SLOTS; k++) out->value[k] = (tg_real)NAN; /* what nothing below writes */
-    if (e->settings.method == TG_SPEEDS) {
-        tgi_speeds_update(e, &row, out);
-        return TG_OK;
-    }
-
-    int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
-    tg_real dt = e->started ? (tg_real)(row.time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
-    tgi_doubt_speeds(e, &row, dt);
-    tgi_watch_shares(e, sample);
-    int32_t turned = tgi_track_motion(e, &row);
-    if (turned) mirror(&e->held, n);
-    tgi_track_turn(e, &row);
-    tg_real q[TG_MAX_STATES];
-    tgi_update_inputs(e, &row, dt, &drive);
-    tgi_input_noise(e, &drive, dt, &row, q);
-    tgi_loads(e, &row, &drive);
-    tgi_along(e, &drive, &now);
-    tg_course course = course_of(e, &row, was_standing, turned, &gap);
-    if (!e->started) e->ground_time = row.time;
-    tgi_reckon(e, &drive, dt, course == TG_GO, &row, q);
-    if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, &row);
-    report_adaptation(e, out->value);
-    const int32_t lost = !go_on(e, &row, &drive, &now, course, dt, q), breaks = gap || lost;
-    balance_forces(e, &drive, row.time);
-    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
-    if (course == TG_GO && !row.reckoned && !isnan(row.value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
-
-    if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
-    tgi_end_row(e, &row, out);
-    e->held = now;
-    report(e, &row, &drive, out);
-    const int32_t blind = is_blind(e, &row, breaks) && course != TG_WAIT, moves = course >= TG_START || course == TG_ANEW;
-    tgi_watch_over(e, &row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
-    out->event = tgi_event_of(e, &row, gap || blind || course == TG_WAIT, lost);
-    const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
-    tgi_curves(e, course == TG_GO && learn && !row.outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
+    blank(out);
+    estimate_row(e, sample, &row, out);
     return TG_OK;
 }
 
@@ -361,14 +377,17 @@ tg_status tg_estimator_block(tg_estimator *e, size_t rows, const double *time, c
     kept.first = kept.rows = 0;
     for (int32_t k = 0; k < TG_OUT_SLOTS; k++)
         if (out[k]) kept.wanted[kept.columns++] = k;
+    for (size_t j = 0; j < rows && j < TG_BATCH; j++) blank(&kept.row[j]);
     *done = 0;
     if (rows > 0) fill(&sample[0], time, in, given, n_given, 0);
     for (; *done < rows; ++*done) {
         const size_t row = *done;
         if (row + 1 < rows) fill(&sample[(row + 1) % 2], time, in, given, n_given, row + 1);
         tg_estimate *const estimate = &kept.row[kept.rows];
-        status = tg_estimator_update(e, &sample[row % 2], estimate);
+        tg_row cleaned;
+        status = accept(e, &sample[row % 2], &cleaned);
         if (status != TG_OK) break;
+        estimate_row(e, &sample[row % 2], &cleaned, estimate);
         event[row] = (uint8_t)estimate->event;
         kept.rows++;
         if (kept.rows == TG_BATCH) hand_over(&kept, out);

@@ -134,6 +134,7 @@ typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real square, noise;     /* mean squares of that slip before the low-pass: the whole, and the part by errors of the wheel speeds */
     tg_real level, sure;       /* mean square of the slip of all wheels; mean weight of a row in `usual` */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
+    tg_real left;              /* of a step in slip, where one wheel spins (left_by_spin) */
 } tgi_warped;
 
 typedef struct { /* driven wheels over a stretch of the way, beyond their usual: sums over `length` wheel radii, and at its end means, along and across */

@@ -346,6 +346,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);
     tgi_reset_slips(e);
+    e->warped.left = 1;
     for (int32_t k = 0; k < TG_SLOTS; k++) e->last_raw[k] = (tg_real)NAN;
     tgi_reset_curves(e);
     tgi_believe(e);

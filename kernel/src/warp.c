@@ -129,12 +129,13 @@ tgi_slips tgi_driven_slips(const tg_estimator *e)
         const tg_lanes steered = lanes_load(s->wheel_ahead + i), ahead = v - lanes_load(s->wheel_side + i) * yaw, hub = tgi_hub_of(ahead, steered * yaw);
         const tg_lanes inverse = 1 / lanes_load(omega + i), by_radius = lanes_load(e->constants.inverse_radius + i), part = hub * inverse * by_radius;
         const tg_lanes straight = lanes_where((tg_choice)(steered != 0), part * v / ahead, v * inverse * by_radius);
+        const tg_choice within = (tg_choice)(part > 0) & (tg_choice)(part < 2) & (tg_choice)(straight > 0) & (tg_choice)(straight < 2);
         for (int32_t j = 0; j < TG_LANES && i + j < n; j++) {
             if (!(e->constants.pulls[i + j] > 0)) continue;
             const tg_hold *const wheel = &e->wheel[i + j];
             slips.along[i + j] = 1 - part[j];
             slips.straight[i + j] = 1 - straight[j];
-            slips.known &= part[j] > 0 && part[j] < 2 && straight[j] > 0 && straight[j] < 2 && wheel->count > 0 && e->time - wheel->time <= (double)s->tuned.silence;
+            slips.known &= within[j] && wheel->count > 0 && e->time - wheel->time <= (double)s->tuned.silence;
             slips.variance += tgi_square(straight[j] * inverse[j]) * P[(i + j) * (stride + 1)];
         }
     }
@@ -207,7 +208,7 @@ void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, t
     const tg_real sure = 1 / (all + noise + tgi_square(e->settings.tuned.small_slip)); /* a spinning wheel's slip tells nothing of radii and ruts */
     w->sure = w->sure > 0 ? w->sure + gain * (sure - w->sure) : sure;
     const tg_real learned = gain * sure / w->sure;
-    const tg_real counts = gain * weight * tgi_square(left_by_spin(e)); /* a mean square holds what is left of a step, squared */
+    const tg_real counts = gain * weight * tgi_square(w->left); /* a mean square holds what is left of a step, squared */
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         const tg_real beyond = warp[i] - w->usual[i];
         w->usual[i] += learned * beyond;
@@ -221,6 +222,7 @@ void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, t
     w->level += counts * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
     w->pulling += fresh * (pull - w->pulling);
     w->slipping = usual_slip(e, w->slipping);
+    w->left = left_by_spin(e);
 }
 
 /* After a row's estimate; `fresh`: its weight over the length of unevenness. `flowing`: the row continues the one before; else its adhesions
@@ -244,7 +246,7 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
     const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
     tg_real lasting = 0, farthest = 0;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
-    const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * left_by_spin(e);
+    const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * w->left;
     for (int i = 0; i < TG_MAX_WHEELS; i++) {
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;
