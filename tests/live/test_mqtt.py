@@ -71,6 +71,26 @@ async def test_by_tls_and_a_number_a_topic(tmp_path, vehicle, short, port):
     }
 
 
+async def test_what_a_broker_retained_is_no_sample(tmp_path, vehicle, short, port):
+    """Of an hour ago it was the first row, and the clock of the whole record an hour behind."""
+    old, *fresh = messages(short.recording, 51)
+    with broker(tmp_path, port):
+        service = Service(vehicle, [f"mqtt://127.0.0.1:{port}/m"])
+        async with listening(port) as (client, _):
+            client.publish("m", json.dumps(old | {"time": fresh[0]["time"] - 3600.0}), retain=True)
+            async with listening(port, "m") as (_, got):
+                await until(lambda: got)  # the broker has it
+            async with running(service):
+                for message in fresh:
+                    client.publish("m", json.dumps(message))
+                await until(lambda: service.core.rows >= 50)
+    rows = [
+        message.time for message in service.seen if message.kind == "estimate" and not message.row.predicted
+    ]
+    assert rows == [message["time"] for message in fresh]
+    assert not events(service, "clock_jump")
+
+
 async def test_a_broker_that_refuses_is_named_and_tried_again(tmp_path, vehicle, short, port, monkeypatch):
     service = Service(vehicle, [f"mqtt://127.0.0.1:{port}/m"], [f"mqtt://127.0.0.1:{port}/out"])
     async with running(service):

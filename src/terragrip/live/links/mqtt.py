@@ -24,7 +24,10 @@ _KEEP = 1.0  # s between two looks at whether the broker is alive
 
 
 class MqttSource:
-    """``mqtt://HOST/machine/+``. A field is ``name``, or ``topic/name`` where the profile says so; a bare number is ``topic``."""
+    """``mqtt://HOST/machine/+``. A field is ``name``, or ``topic/name`` where the profile says so; a bare number is ``topic``.
+
+    Retained messages, which a broker sends again to whoever subscribes, are left out.
+    """
 
     real_time = True
 
@@ -98,8 +101,8 @@ def check(uri: Uri, wild: bool = False) -> Credentials:
 class Connection:
     """A connection by ``mqtt://HOST[:1883]/TOPIC`` or, with TLS, ``mqtts://HOST[:8883]/TOPIC?ca=FILE``, while an ``async with`` lasts.
 
-    ``take`` gets topic and bytes of each message that comes, in the loop; what it raises ends the connection. Lost is raised where the
-    broker cannot be reached, refuses or goes away; InputError as by `check`. Needs a running loop.
+    ``take`` gets topic and bytes of each message that comes, but retained ones, in the loop; what it raises ends the connection. Lost
+    is raised where the broker cannot be reached, refuses or goes away; InputError as by `check`. Needs a running loop.
     """
 
     def __init__(self, uri: Uri, take: Callable[[str, bytes], None] | None = None) -> None:
@@ -125,7 +128,10 @@ class Connection:
         client.on_connect, client.on_disconnect = self._accepted, self._disconnected
         client.on_subscribe = self._subscribed
         if take is not None:
-            client.on_message = lambda _, __, message: take(message.topic, bytes(message.payload))
+            client.on_message = lambda _, __, message: (
+                # What a broker retained for new subscribers is of any age: as a first sample it would set the clock.
+                None if message.retain else take(message.topic, bytes(message.payload))
+            )
 
     async def __aenter__(self) -> Self:
         client = self._client
