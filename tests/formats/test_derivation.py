@@ -70,3 +70,22 @@ def test_a_spoiled_position_is_no_resolution() -> None:
     speed, deviation = derivative(time, position, 1.0)
     assert deviation == pytest.approx(usual, rel=0.3)
     assert speed[50] == pytest.approx(1.5, abs=0.05)
+
+
+def test_an_angle_that_begins_anew_after_a_turn_goes_on() -> None:
+    """A compass heading: each pass through north was a turn of 13 rad/s, slip .2 off in turns; and a wheel's angle within a turn."""
+    time = np.arange(0.0, 120.0, 0.05)
+    turn = 0.3 + 0.2 * np.sin(time / 7)
+    angle = np.concatenate([[0.0], np.cumsum((turn[1:] + turn[:-1]) / 2) * 0.05])
+    table = {"t": time, "heading": np.degrees(-angle) % 360, "wheel": np.angle(np.exp(20j * angle))}
+    ticks = table | {"wheel": np.floor(20 * angle / (2 * np.pi) * 1024) % 1024}
+    to_left = {"derivative_of": "heading", "unit": "deg", "sign": -1}
+    for log, scale in ((table, 1.0), (ticks, 2 * np.pi / 1024)):
+        wheel = {"derivative_of": "wheel", "unit": "rad", "scale": scale, "window": "0.3 s"}
+        channels = {"angular_velocity_z": to_left, "wheel_speed_d": wheel}
+        profile = Profile.from_dict({"time": {"from": "t", "unit": "s"}, "channels": channels})
+        part = converted(profile, LogTable(tuple(log), log))
+        known = np.isfinite(part.columns["angular_velocity_z"])
+        assert known.mean() > 0.95
+        np.testing.assert_allclose(part.columns["angular_velocity_z"][known], turn[known], atol=0.002)
+        np.testing.assert_allclose(part.columns["wheel_speed_d"][known], 20 * turn[known], atol=0.06)

@@ -221,7 +221,9 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
     if origin.constant is not None:
         raw = np.full(len(time), quantity(origin.constant, unit_of(name) or "1"))
     elif origin.derivative_of is not None:
-        raw, deviation = _rate(origin, log, time)
+        turns = unit_of(name) == "rad/s" and origin.scale != 0
+        turn = 2 * np.pi / abs(_factor(name, origin, log) * origin.scale) if turns else None
+        raw, deviation = _rate(origin, log, time, turn)
     elif origin.norm_of is not None:
         raw = np.sqrt(sum(part**2 for part in _raw(origin.norm_of, log, time)))
     elif origin.sum_of is not None:
@@ -315,8 +317,9 @@ def _without_invalid(values: Floats, origin: Source) -> Floats:
     return np.where(bad, np.nan, values)
 
 
-def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | None]:
-    """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation."""
+def _rate(origin: Source, log: LogTable, time: Floats, turn: float | None) -> tuple[Floats, float | None]:
+    """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation; of angles, of which a whole
+    turn is ``turn``, their rate."""
     positions = _raw(origin.derivative_of or (), log, time)
     if origin.is_geographic:
         positions = [origin.scale * part for part in positions]
@@ -331,6 +334,8 @@ def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | 
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         result[fresh], deviation = derivative(when, where, origin.window, along)
     elif len(positions) == 1:
+        if turn is not None:
+            where = _unrolled(where[:, 0], turn)
         result[fresh], deviation = derivative(when, where, origin.window)
     else:
         rates = np.stack([derivative(when, p, origin.window)[0] for p in where.T], axis=1)
@@ -338,6 +343,11 @@ def _rate(origin: Source, log: LogTable, time: Floats) -> tuple[Floats, float | 
         along = np.divide(rates, size[:, None], out=np.zeros_like(rates), where=size[:, None] > 0)
         deviation = derivative(when, where, origin.window, np.nan_to_num(along))[1]
     return result, deviation
+
+
+def _unrolled(angle: Floats, turn: float) -> Floats:
+    """An angle (n,) that begins anew after each ``turn``, as a heading does, without these steps; a count of many turns as it is."""
+    return np.unwrap(angle, period=turn) if len(angle) and np.ptp(angle) <= 1.001 * turn else angle
 
 
 def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:
