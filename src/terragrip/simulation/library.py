@@ -125,11 +125,6 @@ def _library(section: str) -> Tree:
     return dict(_read("library", f"{section}.yaml").data)
 
 
-def library_soil(name: str) -> Tree:
-    """One of the package's soils, as a scenario file would write it; raises KeyError if there is none."""
-    return dict(_library("soils")[name])
-
-
 @cache
 def _packaged() -> dict[str, Document]:
     folder = resources.files("terragrip.simulation") / "scenarios"
