@@ -47,58 +47,62 @@ def detect(data: bytes, source: str) -> Dialect:
     with ``#``, ``%`` or ``//`` are passed over, and so are lines that are no rows of the table, as loggers write them.
     """
     start = _start_of(data)
-    head = data[start : start + HEAD]
-    if len(head) == HEAD and b"\n" in head:
-        head = head[: head.rindex(b"\n")]
-    lines = [line for line in head.decode("utf-8", "replace").splitlines() if line.strip()][:60]
-    if not lines:
-        raise InputError("is empty", file=source, hint="give a table with a header and rows")
-    if lines[0].lstrip().startswith(("{", "[{")):
-        hint = "save it as CSV or Parquet, e.g. by pandas.read_json(FILE, lines=True).to_parquet(...) if each line is an object"
-        raise InputError("is JSON", file=source, hint=hint)
+    lines = _first_lines(data, start)
+    _require_table(lines, source)
     if lines[0].lower().startswith("sep="):  # Excel's own hint
-        start = _after_lines(data, start, 1)
-        lines = lines[1:] or [""]
+        start, lines = _after_lines(data, start, 1), lines[1:] or [""]
     before = _preamble(lines)
     start, lines = _after_lines(data, start, before), lines[before:]
     separator, decimal = _best(lines)
-    header = split(_without_mark(lines[0]), separator)
-    grouped = _under_groups(header, lines, separator, decimal)
+    table = [split(line, separator) for line in lines]
+    table[0] = split(_without_mark(lines[0]), separator)
+    grouped = _under_groups(table, decimal)
     if grouped is not None:
-        header, start, lines = grouped, _after_lines(data, start, 1), lines[1:]
-    second = split(lines[1], separator) if len(lines) > 1 else []
+        start, table = _after_lines(data, start, 1), [grouped, *table[2:]]
+    header, second = table[0], table[1] if len(table) > 1 else []
     if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
-        raise InputError(
-            "the first row has numbers, not column names",
-            file=source,
-            hint="put a header row above the numbers",
-        )
-    rows = 1
-    third = split(lines[2], separator) if len(lines) > 2 else []
-    if len(lines) > 2 and _is_units_row(second, third, decimal):
-        rows = 2
-    elif (
-        len(lines) > 3  # three rows of header: names, units, short names
-        and not any(_is_number(cell, decimal) for cell in third)
-        and _is_units_row(second, split(lines[3], separator), decimal)
-    ):
-        rows = 3
-    units = dict(zip(header, map(_bare, second), strict=False)) if rows > 1 else {}
+        hint = "put a header row above the numbers"
+        raise InputError("the first row has numbers, not column names", file=source, hint=hint)
     if len(second) == len(header) + 1 and not second[-1]:
         header.append("")
-    names, notes = names_and_units(header)
-    units = {names[header.index(h)]: u for h, u in units.items() if u}
-    units = {**notes, **units}
-    columns = list(zip_longest(*(split(line, separator) for line in lines[rows:]), fillvalue=""))
+    names, units = names_and_units(header)
+    rows = _header_rows(table, decimal)
+    if rows > 1:
+        units |= {name: stated for name, cell in zip(names, second, strict=False) if (stated := _bare(cell))}
+    columns = list(zip_longest(*table[rows:], fillvalue=""))
     in_cells = {
         k: unit
-        for k, column in enumerate(columns)
-        if k < len(names) and (unit := _unit_in_all(column)) and units.get(names[k], unit) == unit
+        for k, (name, column) in enumerate(zip(names, columns, strict=False))
+        if (unit := _unit_in_all(column)) and units.get(name, unit) == unit
     }
     units |= {names[k]: unit for k, unit in in_cells.items()}
     others = zip(columns[1:], names[1:], strict=False)  # the first may be an index
     unnamed = sum(any(column) for column, name in others if not name)
     return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells, unnamed)
+
+
+def _first_lines(data: bytes, start: int) -> list[str]:
+    """The first lines from ``start`` that are not blank, 60 at most."""
+    head = data[start : start + HEAD]
+    if len(head) == HEAD and b"\n" in head:
+        head = head[: head.rindex(b"\n")]
+    return [line for line in head.decode("utf-8", "replace").splitlines() if line.strip()][:60]
+
+
+def _require_table(lines: list[str], source: str) -> None:
+    if not lines:
+        raise InputError("is empty", file=source, hint="give a table with a header and rows")
+    if lines[0].lstrip().startswith(("{", "[{")):
+        hint = "save it as CSV or Parquet, e.g. by pandas.read_json(FILE, lines=True).to_parquet(...) if each line is an object"
+        raise InputError("is JSON", file=source, hint=hint)
+
+
+def _header_rows(table: list[list[str]], decimal: str) -> int:
+    """How many rows the header has: names; names and units; or names, units and short names."""
+    if len(table) > 2 and _is_units_row(table[1], table[2], decimal):
+        return 2
+    short = len(table) > 3 and not any(_is_number(cell, decimal) for cell in table[2])
+    return 3 if short and _is_units_row(table[1], table[3], decimal) else 1
 
 
 def _unit_in_all(cells: tuple[str, ...]) -> str | None:
@@ -107,14 +111,15 @@ def _unit_in_all(cells: tuple[str, ...]) -> str | None:
     return found.pop() if len(found) == 1 else None
 
 
-def _under_groups(groups: list[str], lines: list[str], separator: str, decimal: str) -> list[str] | None:
-    """The names of a header of two rows, where the first names groups of columns (``groups``, empty behind each); None of any other.
+def _under_groups(table: list[list[str]], decimal: str) -> list[str] | None:
+    """The names of a header of two rows, where the first names groups of columns and is empty behind each; None of any other.
 
     A name that stands in several groups, or alone in one, has its group's before it; below a group of one may stand but a unit, or nothing.
     """
-    if len(lines) < 4 or "" not in groups[1:] or not groups[0]:
+    groups = table[0]
+    if len(table) < 4 or "" not in groups[1:] or not groups[0]:
         return None
-    names = split(lines[1], separator)
+    names = table[1]
     if len(names) != len(groups) or any(_is_number(name, decimal) for name in names):
         return None
     if not all(
