@@ -112,22 +112,32 @@ class Vehicle(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        self._check_axles()
+        self._check_geometry()
+        if self.driveline is not None and not self.knows_wheels:
+            raise Fault("needs the wheels' radius and inertia", _ADD_WHEELS, ("driveline",))
+        for key in ("drive_torque_gain", "drive_torque_offset", "wheel_radius"):
+            unknown = next((name for name in getattr(self.calibration, key) if name not in self.wheels), None)
+            if unknown is not None:
+                hint = f"the wheels are {', '.join(self.wheels)}"
+                raise Fault("no such wheel", hint, ("calibration", key, unknown))
+        return self
+
+    def _check_axles(self) -> None:
+        """Names, numbers and data of axles and wheels, and what the axles carry."""
         names = [name for axle in self.axles.values() for name in axle.wheels]
         if not 1 <= len(names) <= MAX_WHEELS:
             raise Fault(f"there are {len(names)} wheels", f"a vehicle has 1 to {MAX_WHEELS}", ("axles",))
+        some_know = any(axle.wheel for axle in self.axles.values())
         for key, axle in self.axles.items():
             if not NAME.match(key):
-                raise Fault(
-                    "is not an axle name", "use letters, digits and underscores, e.g. front", ("axles", key)
-                )
+                hint = "use letters, digits and underscores, e.g. front"
+                raise Fault("is not an axle name", hint, ("axles", key))
             twice = next((name for name in axle.wheels if names.count(name) > 1), None)
             if twice is not None:
-                raise Fault(
-                    f"the wheel {twice} occurs twice",
-                    "give every wheel its own name",
-                    ("axles", key, "wheels"),
-                )
-            if axle.wheel is None and not self.knows_wheels and any(a.wheel for a in self.axles.values()):
+                hint = "give every wheel its own name"
+                raise Fault(f"the wheel {twice} occurs twice", hint, ("axles", key, "wheels"))
+            if axle.wheel is None and some_know and not self.knows_wheels:
                 raise Fault("has no wheel data, and another axle has", _ADD_WHEELS, ("axles", key))
         carried = sum(axle.mass for axle in self.axles.values())
         if abs(carried - self.mass) > _MASS_TOLERANCE * self.mass:
@@ -136,6 +146,9 @@ class Vehicle(Part):
                 "make the axles' masses add up to the mass",
                 ("axles",),
             )
+
+    def _check_geometry(self) -> None:
+        """Lengths that two axles need, and what they make of payload and steering."""
         if self.payload is not None and not -0.5 <= self.payload.x / (self.wheelbase or np.inf) <= 1.5:
             raise Fault(
                 f"{self.payload.x:g} m is far from between the axles, {self.wheelbase:g} m apart",
@@ -143,23 +156,11 @@ class Vehicle(Part):
                 ("payload", "x"),
             )
         if self.articulated and (len(self.axles) < 2 or any(axle.steered for axle in self.axles.values())):
-            raise Fault(
-                "needs two axles, none of them steered",
-                "leave out 'steered': a vehicle that bends steers by its joint",
-                ("articulated",),
-            )
-        if self.driveline is not None and not self.knows_wheels:
-            raise Fault("needs the wheels' radius and inertia", _ADD_WHEELS, ("driveline",))
+            hint = "leave out 'steered': a vehicle that bends steers by its joint"
+            raise Fault("needs two axles, none of them steered", hint, ("articulated",))
         for key in ("wheelbase", "center_of_gravity_height") if len(self.axles) > 1 else ():
             if getattr(self, key) is None or key not in self.model_fields_set:
                 raise Fault("is missing", f"two or more axles need it: add e.g. '{key}: 0.6 m'", (key,))
-        for key in ("drive_torque_gain", "drive_torque_offset", "wheel_radius"):
-            unknown = next((name for name in getattr(self.calibration, key) if name not in names), None)
-            if unknown is not None:
-                raise Fault(
-                    "no such wheel", f"the wheels are {', '.join(names)}", ("calibration", key, unknown)
-                )
-        return self
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:

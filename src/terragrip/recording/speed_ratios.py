@@ -53,50 +53,63 @@ def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Wheel speeds that are likely not in rad/s, or radii that are wrong, by the ground speed."""
     if _stands(recording, max(vehicle.wheel_radius)):
         return []
-    result: dict[str, list[tuple[str, float]]] = {}
     straight = straight_rows(recording, vehicle)
-    usual: dict[str, float] = {}
-    turning = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
-    ratios = {
-        w: None if own is None else ratio_of(recording, vehicle.radii[w] * np.where(straight, own, np.nan))
-        for w, own in turning.items()
-    }
+    ratios = {}
+    for wheel, radius in vehicle.radii.items():
+        turning = recording.channels.get(f"wheel_speed_{wheel}")
+        ratio = None if turning is None else ratio_of(recording, radius * np.where(straight, turning, np.nan))
+        if ratio is not None:
+            ratios[wheel] = ratio
+    return _units_off(vehicle, ratios) or _axles_off(recording, vehicle, ratios, straight)
+
+
+def _units_off(vehicle: Vehicle, ratios: dict[str, float]) -> list[str]:
+    """Sentences on the wheels whose ``ratios`` of rim to ground speed no slip explains, those of one cause together."""
     # of wheels of unlike radii one factor is none of the radii
-    known = [ratio for ratio in ratios.values() if ratio]
     unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
-    shared = unlike and len(known) > 1 and max(known) < np.sqrt(_APART) * min(known)
-    for wheel, radius, driven in zip(vehicle.wheels, vehicle.wheel_radius, vehicle.driven, strict=True):
-        ratio = ratios[wheel]
-        if ratio is not None and driven:
-            usual[wheel] = ratio
-        if ratio is None or RATIOS[0] <= ratio <= RATIOS[1]:
-            continue
-        reasons = list(_RATIOS)
-        if not shared:
-            reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
-            reasons.append((3.6 * float(radius), "wheel_speed may be the rim's speed in km/h"))
-        # The nearest reason is reported, and with it those that the slip, which is unknown, leaves as likely.
-        near = sorted((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
-        likely = [text for distance, text in near if distance < near[0][0] + _SLIP]
-        why = ", or ".join(likely) if near[0][0] <= np.log(1.35) else "check units, gear ratio and radius"
-        result.setdefault(why, []).append((wheel, ratio))
-    mean = {
-        name: float(np.exp(np.mean([np.log(usual[w]) for w in axle.wheels])))  # of both sides: turns cancel
-        for name, axle in vehicle.axles.items()
-        if all(w in usual for w in axle.wheels)
-    }
-    if not result and mean and max(mean.values()) > _APART * min(mean.values()):
-        fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
-        if not _is_one_ratio(recording, vehicle, fast, slow, straight):
-            return []
-        return [
-            f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
-            "radii, and the wheel of each column."
-        ]
+    shared = unlike and len(ratios) > 1 and max(ratios.values()) < np.sqrt(_APART) * min(ratios.values())
+    result: dict[str, list[tuple[str, float]]] = {}
+    for wheel, ratio in ratios.items():
+        if not RATIOS[0] <= ratio <= RATIOS[1]:
+            why = _cause(ratio, None if shared else vehicle.radii[wheel])
+            result.setdefault(why, []).append((wheel, ratio))
     return [
         f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
         f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
         for why, those in result.items()
+    ]
+
+
+def _cause(ratio: float, radius: float | None) -> str:
+    """The cause nearest to a ratio, and with it those that the slip, which is unknown, leaves as likely."""
+    reasons = list(_RATIOS)
+    if radius is not None:
+        reasons.append((radius, "wheel_speed may be the rim's speed in m/s: divide it by the radius"))
+        reasons.append((3.6 * radius, "wheel_speed may be the rim's speed in km/h"))
+    near = sorted((abs(np.log(ratio / (1.08 * r))), text) for r, text in reasons)
+    nearest = near[0][0]
+    if nearest > np.log(1.35):
+        return "check units, gear ratio and radius"
+    return ", or ".join(text for distance, text in near if distance < nearest + _SLIP)
+
+
+def _axles_off(
+    recording: Recording, vehicle: Vehicle, ratios: dict[str, float], straight: Bools
+) -> list[str]:
+    """A sentence on the two driven axles whose rims go at speeds furthest apart, where their ratio stays one."""
+    mean = {
+        name: float(np.exp(np.mean([np.log(ratios[w]) for w in axle.wheels])))  # of both sides: turns cancel
+        for name, axle in vehicle.axles.items()
+        if axle.driven and all(w in ratios for w in axle.wheels)
+    }
+    if not mean or max(mean.values()) <= _APART * min(mean.values()):
+        return []
+    fast, slow = (pick(mean, key=lambda name: mean[name]) for pick in (max, min))
+    if not _is_one_ratio(recording, vehicle, fast, slow, straight):
+        return []
+    return [
+        f"The rims of the axle {fast} go {mean[fast] / mean[slow]:.2f} times as fast as those of {slow}, both driven: check their "
+        "radii, and the wheel of each column."
     ]
 
 
