@@ -89,3 +89,53 @@ def test_an_angle_that_begins_anew_after_a_turn_goes_on() -> None:
         assert known.mean() > 0.95
         np.testing.assert_allclose(part.columns["angular_velocity_z"][known], turn[known], atol=0.002)
         np.testing.assert_allclose(part.columns["wheel_speed_d"][known], 20 * turn[known], atol=0.06)
+
+
+def heading_notes(heading: Floats, axes: list[str], yaw_unit: str = "deg", crab: float = 0.0) -> list[str]:
+    """Notes on a heading beside a drive with turns, a third of it in reverse, ``crab`` [rad] to the left of where it points."""
+    time = np.arange(0.0, 200.0, 0.1)
+    way = course_of(time) + crab
+    step = 0.1 * np.where(time % 60 > 40, -1.5, 1.5)
+    noise = np.random.default_rng(5).normal(0.0, 0.02, (2, len(time)))
+    east, north = np.cumsum(step * np.cos(way)), np.cumsum(step * np.sin(way))
+    log = {"t": time, "east": east + noise[0], "north": north + noise[1], "heading": heading}
+    log |= {"lat": 48.0 + log["north"] / 111_195.0, "lon": 11.0 + log["east"] / 74_403.0}
+    speed = {
+        "derivative_of": axes,
+        "unit": "deg" if "lat" in axes else "m",
+        "window": "1 s",
+        "forward": {"yaw": "heading", "unit": yaw_unit},
+    }
+    profile = Profile.from_dict({"time": {"from": "t", "unit": "s"}, "channels": {"ground_speed": speed}})
+    part = converted(profile, LogTable(tuple(log), log))
+    return [note for note in part.notes if "derivative of" not in note]
+
+
+def course_of(time: Floats) -> Floats:
+    """From east to the left [rad]."""
+    return 0.5 * np.sin(time / 9) + 0.02 * time
+
+
+def test_a_heading_of_other_axes_than_the_positions_is_named() -> None:
+    """A compass beside east and north: -.6 m/s for 2.0, stated to .01, and the advice was that torques have no sign; 30 deg beside the
+    path: slip .22 for .10 without a word."""
+    course = course_of(np.arange(0.0, 200.0, 0.1))
+    compass = np.degrees(np.pi / 2 - course) % 360
+    assert heading_notes(course, ["east", "north"], "rad") == []
+    assert heading_notes(compass, ["north", "east"]) == []
+    assert heading_notes(compass, ["lat", "lon"]) == []
+    assert heading_notes(compass, ["lat", "lon"], crab=0.1) == []
+    (note,) = heading_notes(compass, ["east", "north"])
+    assert note.startswith(
+        "ground_speed is wrong: check heading, which counts from the second axis of east, north"
+    )
+    assert note.endswith("write 'derivative_of: [north, east]'.")
+    (note,) = heading_notes(np.degrees(course), ["lat", "lon"])
+    assert note.startswith(
+        "ground_speed is wrong: check heading, which does not count from north to the right"
+    )
+    (note,) = heading_notes(compass + 30, ["lat", "lon"])
+    assert note.startswith(
+        "The path of lat, lon goes 30 deg beside heading: if the vehicle does not drive in crab, ground_speed"
+    )
+    assert "13% too small: check the zero of heading" in note

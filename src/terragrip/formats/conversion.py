@@ -13,6 +13,7 @@ from terragrip.arrays import Bools, Floats
 from terragrip.errors import InputError
 from terragrip.formats.binding import bound, efforts
 from terragrip.formats.derivation import (
+    beside_heading,
     derivative,
     fresh_positions,
     pitch_of,
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     from terragrip.formats.profile import Profile
 
 Column = npt.NDArray[Any]
+_CRAB = np.radians(10.0)  # beside a heading: the speed along it is 2 % less than that of the path
+_TOGETHER = 0.8  # path and heading, which keep one angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +97,8 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
                 f"{name} is the derivative of {', '.join(origin.derivative_of or ())} over {origin.window:g} s, "
                 f"with a standard deviation of about {deviation:.2g} {unit_of(name)}."
             )
+        if origin.forward is not None:
+            notes += _heading_notes(name, origin, log, time)
     if profile.rows is not None:
         keep = _kept(profile.rows, log)
         time, channels = time[keep], {name: values[keep] for name, values in channels.items()}
@@ -320,20 +325,13 @@ def _without_invalid(values: Floats, origin: Source) -> Floats:
 def _rate(origin: Source, log: LogTable, time: Floats, turn: float | None) -> tuple[Floats, float | None]:
     """Speed (n,) along the positions' path, at the instants of fresh positions, and its standard deviation; of angles, of which a whole
     turn is ``turn``, their rate."""
-    positions = _raw(origin.derivative_of or (), log, time)
-    if origin.is_geographic:
-        positions = [origin.scale * part for part in positions]
-        for channel, column, part in zip(PLACES, origin.derivative_of or (), positions, strict=True):
-            refuse_place(column, part, log.source, channel)
-        positions = list(metres_of(*positions))
-    fresh = fresh_positions(time, positions) & np.isfinite(time)
-    when, where = time[fresh], np.stack([p[fresh] for p in positions], axis=1)
-    result = np.full(len(time), np.nan)
+    fresh, where = _positions(origin, log, time)
+    when, result = time[fresh], np.full(len(time), np.nan)
     if origin.forward is not None:
         heading = _heading(origin, log, time)[fresh]
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         result[fresh], deviation = derivative(when, where, origin.window, along)
-    elif len(positions) == 1:
+    elif where.shape[1] == 1:
         if turn is not None:
             where = _unrolled(where[:, 0], turn)
         result[fresh], deviation = derivative(when, where, origin.window)
@@ -343,6 +341,45 @@ def _rate(origin: Source, log: LogTable, time: Floats, turn: float | None) -> tu
         along = np.divide(rates, size[:, None], out=np.zeros_like(rates), where=size[:, None] > 0)
         deviation = derivative(when, where, origin.window, np.nan_to_num(along))[1]
     return result, deviation
+
+
+def _positions(origin: Source, log: LogTable, time: Floats) -> tuple[Bools, Floats]:
+    """Rows (n,) with a fresh position, and these (m, d), in metres where they are a latitude and a longitude."""
+    positions = _raw(origin.derivative_of or (), log, time)
+    if origin.is_geographic:
+        positions = [origin.scale * part for part in positions]
+        for channel, column, part in zip(PLACES, origin.derivative_of or (), positions, strict=True):
+            refuse_place(column, part, log.source, channel)
+        positions = list(metres_of(*positions))
+    fresh = fresh_positions(time, positions) & np.isfinite(time)
+    return fresh, np.stack([p[fresh] for p in positions], axis=1)
+
+
+def _heading_notes(name: str, origin: Source, log: LogTable, time: Floats) -> list[str]:
+    """A sentence where the path goes surely beside the heading along which a speed is taken."""
+    fresh, where = _positions(origin, log, time)
+    heading = _heading(origin, log, time)[fresh]
+    angle, together = beside_heading(time[fresh], where, heading, origin.window)
+    other, exchanged = beside_heading(time[fresh], where[:, ::-1], heading, origin.window)
+    if together > _TOGETHER and abs(angle) < _CRAB:
+        return []
+    forward, axes = origin.forward, ", ".join(origin.derivative_of or ())
+    yaw = (forward and forward.yaw) or "the quaternion"
+    without = "or leave 'forward' out, and the sign is lost"
+    if exchanged > _TOGETHER and abs(other) < _CRAB:
+        if origin.is_geographic:
+            return [f"{name} is wrong: check {yaw}, which does not count from north to the right, {without}."]
+        turned = ", ".join((origin.derivative_of or ())[::-1])
+        return [
+            f"{name} is wrong: check {yaw}, which counts from the second axis of {axes} to the first, as a compass does from north "
+            f"to east: write 'derivative_of: [{turned}]'."
+        ]
+    if together <= _TOGETHER:
+        return []
+    return [
+        f"The path of {axes} goes {np.degrees(abs(angle)):.0f} deg beside {yaw}: if the vehicle does not drive in crab, {name}, which is "
+        f"taken along it, is {1 - np.cos(angle):.0%} too small: check the zero of {yaw}, {without}."
+    ]
 
 
 def _unrolled(angle: Floats, turn: float) -> Floats:

@@ -11,6 +11,7 @@ from terragrip.recording.noise import MAD_TO_SD
 _FEWEST = 4  # points for a parabola with one to spare
 _ROUNDS = 3  # of reweighting, after which outlying positions no longer move
 _WIDEST = 100  # samples to either side of a window
+_FAR = 0.3  # of the longest way in a window: shorter ones show no direction
 _BLOCK = 20_000  # instants at once, to bound memory
 
 
@@ -142,6 +143,21 @@ def _moving(speed: Floats, known: Bools) -> Bools:
 def _normal(basis: Floats, weight: Floats) -> Floats:
     """Normal matrices (n, 3, 3); the ridge only serves windows that are too empty to count."""
     return np.einsum("nk,nki,nkj->nij", weight, basis, basis) + 1e-12 * np.eye(3)
+
+
+def beside_heading(time: Floats, position: Floats, heading: Floats, window: float) -> tuple[float, float]:
+    """The angle [rad] by which positions (n, 2) go beside a heading (n,) [rad, from the first axis to the second], over ``window`` [s],
+    forward and backward alike; and how much they keep to it, 0 to 1: 0 where nothing moves."""
+    spacing = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    step = max(1, round(window / spacing)) if spacing > 0 else len(time)
+    chord = (position[step:] - position[:-step]) @ np.array([1.0, 1.0j])
+    middle, size = heading[step // 2 :][: len(chord)], np.abs(chord)
+    known = np.isfinite(middle)
+    known &= size > (_FAR * np.quantile(size[known], 0.95) if known.any() else 0.0)
+    if not known.any():
+        return 0.0, 0.0
+    mean = np.mean((chord[known] / size[known]) ** 2 * np.exp(-2j * middle[known]))
+    return float(np.angle(mean)) / 2, float(np.abs(mean))
 
 
 def yaw_of(quaternion: list[Floats]) -> Floats:
