@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
@@ -29,7 +28,6 @@ from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.checks import NOTHING_TOWED, refuse_estimates
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
-from terragrip.recording.repeats import Repeats
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
 from terragrip.vehicle import Vehicle
 
@@ -121,69 +119,77 @@ def inspect(
     it. Nothing is required of the log but that it is a table; raises InputError if it is none, or one of estimates.
     """
     machine = vehicle if isinstance(vehicle, Vehicle) or vehicle is None else Vehicle.load(vehicle)
-    databases = tuple(dbc)
     chosen = profile if isinstance(profile, Profile) or profile is None else Profile.load(profile)
-    log, every = read_whole_or_thinned(path, (*databases, *(chosen.dbc if chosen else ())))
+    log, every = read_whole_or_thinned(path, (*dbc, *(chosen.dbc if chosen else ())))
     refuse_estimates(log.names, str(log.source))
-    warnings, recording = list(log.notes), None
+    recording, fits, remarks = _recording_or_fit(log, chosen)
+    warnings = [*log.notes, *remarks]
     if every > 1:
         warnings.insert(0, _SPARSE.format(size_of(path) / 1e9, every))
-    fits = Fit()
-    try:
-        recording = _recording(log, chosen)
-        said = (*warnings, NOTHING_TOWED)  # the latter among what is missing
-        warnings += [note for note in recording.notes if note not in said]
-    except InputError as error:
-        if profile is not None:
-            raise
-        fits = fit_of(log)
-        warnings += [] if fits.names else [f"Without a profile: {_cause(error)}"]
+    unfit = ""
     if recording is not None:
         warnings += unit_warnings(recording, machine)
-    unfit = "" if recording is None or machine is None else _unfit(recording, machine)
-    warnings += [unfit] * bool(unfit)
-    if recording is not None and profile is not None:
-        log = _as_table(recording, log)
+        unfit = "" if machine is None else _unfit(recording, machine)
+        warnings += [unfit] * bool(unfit)
+        log = log if chosen is None else _as_table(recording, log)
     seen = Seen.of(log, whole=every == 1)
-    numbers = seen.numbers()
     proposals = seen.proposals(GENERAL, machine)
     with suppress(InputError):  # a log that no profile of these proposals reads
         add_signs(proposals, _recording(log, seen.profile(proposals)), machine)
-    wheels = {channel for channel in proposals if channel.startswith("wheel_speed_")}
-    # A robot's profile of four wheels, of six in the log.
-    if wheels - fits.channels and wheels & fits.channels:
-        fits = Fit()
-    quiet = silent(numbers, proposals, seen.units)
-    warnings += notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)
-    if seen.stamp is not None:
-        warnings += [f"{seen.stamp.name}: {seen.stamp.doubt}"] * bool(seen.stamp.doubt)
-        warnings += other_clocks(numbers, seen.stamp.name, seen.units)
-    warnings += [*proposals.left_out, *quiet, *(note for note in seen.repeats.notes() if recording is None)]
-    stamp, base = seen.stamp, seen.base
+    fits = _of_all_wheels(fits, proposals)
+    quiet = silent(seen.numbers(), proposals, seen.units)
+    warnings += [*_notes_on(seen), *proposals.left_out, *quiet]
+    if recording is None:
+        warnings += seen.repeats.notes()
     present = proposals.keys() | fits.channels
     ready = recording is not None and is_ready(recording)
     return Inspection(
         file=str(log.source),
         sha256=str(log.sha256),
-        rows=seen.repeats.merged + len(next(iter(seen.columns.values()), ()) if base is None else base),
-        time=None
-        if stamp is None or base is None
-        else _time_summary(stamp[0], stamp[1], base, seen.whole, seen.repeats),
-        columns=tuple(
-            _column_summary(n, c, seen.units.get(n), seen.clock_of(n), seen.whole)
-            for n, c in seen.columns.items()
-        ),
+        rows=seen.rows,
+        time=_time_summary(seen),
+        columns=tuple(_column_summary(name, seen) for name in seen.columns),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         proposals=proposals,
-        missing=tuple(missing_channels(present, stamp is not None, seen.columns, machine)),
+        missing=tuple(missing_channels(present, seen.stamp is not None, seen.columns, machine)),
         warnings=tuple(warnings),
         ready=ready,
         fitting=fits.names,
         nearly=fits.nearly,
         unfit=unfit,
         refused="" if ready or fits.names else refusal(present, quiet),
-        profile=seen.profile_text(proposals, databases, os.path.basename(str(log.source))),
+        profile=seen.profile_text(proposals, tuple(dbc), os.path.basename(str(log.source))),
     )
+
+
+def _recording_or_fit(
+    log: LogTable | SignalLog, profile: Profile | None
+) -> tuple[Recording | None, Fit, list[str]]:
+    """What a log becomes, or, without a profile, the shipped ones that fit it where it becomes nothing; and sentences on that."""
+    try:
+        recording = _recording(log, profile)
+    except InputError as error:
+        if profile is not None:
+            raise
+        fits = fit_of(log)
+        return None, fits, [] if fits.names else [f"Without a profile: {_cause(error)}"]
+    said = (*log.notes, NOTHING_TOWED)  # the latter among what is missing
+    return recording, Fit(), [note for note in recording.notes if note not in said]
+
+
+def _of_all_wheels(fits: Fit, channels: Iterable[str]) -> Fit:
+    """The profiles that fit, unless they leave wheels of the log out, as a robot's profile of four wheels does with a log of six."""
+    wheels = {channel for channel in channels if channel.startswith("wheel_speed_")}
+    return Fit() if wheels - fits.channels and wheels & fits.channels else fits
+
+
+def _notes_on(seen: Seen) -> list[str]:
+    """Sentences on texts that should be numbers and on clocks."""
+    notes = [*notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)]
+    if seen.stamp is not None:
+        notes += [f"{seen.stamp.name}: {seen.stamp.doubt}"] * bool(seen.stamp.doubt)
+        notes += other_clocks(seen.numbers(), seen.stamp.name, seen.units)
+    return notes
 
 
 def _unfit(recording: Recording, vehicle: Vehicle) -> str:
@@ -223,17 +229,19 @@ def _as_table(recording: Recording, table: LogTable | SignalLog) -> LogTable:
     return LogTable(tuple(columns), columns, units, table.source, table.sha256)
 
 
-def _time_summary(name: str, unit: str, time: Floats, whole: bool, repeats: Repeats) -> TimeSummary | None:
-    known = time[np.isfinite(time)]
+def _time_summary(seen: Seen) -> TimeSummary | None:
+    if seen.stamp is None or seen.base is None:
+        return None
+    known = seen.base[np.isfinite(seen.base)]
     if len(known) < 2:
         return None
     spacing = np.diff(known)
     low, middle, high = (float(q) for q in np.quantile(spacing, [0.05, 0.5, 0.95]))
-    wide = np.flatnonzero(spacing > max(5 * middle, 0.5)) if whole else np.empty(0, dtype=np.intp)
+    wide = np.flatnonzero(spacing > max(5 * middle, 0.5)) if seen.whole else np.empty(0, dtype=np.intp)
     longest = wide[np.argsort(spacing[wide])[::-1][:5]]
     return TimeSummary(
-        column=name,
-        unit=unit,
+        column=seen.stamp.name,
+        unit=seen.stamp.unit,
         start=float(known[0]),
         duration=float(known[-1] - known[0]),
         spacing_05=low,
@@ -241,9 +249,9 @@ def _time_summary(name: str, unit: str, time: Floats, whole: bool, repeats: Repe
         spacing_95=high,
         gaps=tuple((float(known[k]), float(spacing[k])) for k in longest),
         gap_count=len(wide),
-        repeated=repeats.merged + repeats.other,
+        repeated=seen.repeats.merged + seen.repeats.other,
         backward=int(np.sum(spacing < 0)),
-        missing=len(time) - len(known),
+        missing=len(seen.base) - len(known),
     )
 
 
@@ -255,9 +263,8 @@ def _spanned(time: Floats, whole: bool) -> float:
     return float(steps[steps < 100 * np.median(steps)].sum()) or 1.0
 
 
-def _column_summary(
-    name: str, column: npt.NDArray[Any], unit: str | None, time: Floats | None, whole: bool
-) -> ColumnSummary:
+def _column_summary(name: str, seen: Seen) -> ColumnSummary:
+    column, unit, time = seen.columns[name], seen.units.get(name), seen.clock_of(name)
     rows = max(len(column), 1)
     if column.dtype.kind == "O":
         present = [str(cell) for cell in column if cell not in (None, "")]
@@ -281,7 +288,7 @@ def _column_summary(
             fresh = fresh_samples(when, sample, held)
             when, sample = when[fresh], sample[fresh]
         noise = white_noise(when, sample)
-        rate = 1 / held if held is not None else count / _spanned(time, whole)
+        rate = 1 / held if held is not None else count / _spanned(time, seen.whole)
     return ColumnSummary(
         name, "number", unit, count, 1 - count / rows, rate, held, noise, low, q05, middle, q95, high
     )

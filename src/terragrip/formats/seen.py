@@ -91,6 +91,12 @@ class Seen:
         )
         return cls(log.columns, log.units, stamp, instants, {}, since_1970, whole, repeats)
 
+    @property
+    def rows(self) -> int:
+        """How many rows the log has, those that say the same twice included; of signals the instants of all."""
+        of = next(iter(self.columns.values()), ()) if self.base is None else self.base
+        return self.repeats.merged + len(of)
+
     def clock_of(self, name: str) -> Floats | None:
         """The instants of a column; None of the time column, which has no rate or noise of its own."""
         own = self.stamp is not None and name == self.stamp[0]
