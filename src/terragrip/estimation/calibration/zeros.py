@@ -173,16 +173,15 @@ def torque_zeros(
         return [], [Unknown(key, "no torque was measured at standstill")]
     stated = 3 * (vehicle.uncertainty.drive_torque_offset or 0.0)
     allowed = np.maximum(stated, _IDLE_SHARE * _work(windows, torque))
-    calm = resting(windows, torque, stops, windows.torque_count, noise, allowed, stated)
-    sloped = [(spell, _held_share(windows, vehicle, torque, spell)) for spell in stops]
-    sloped = [(spell, share) for spell, share in sloped if np.isfinite(share)]
-    holding = [spell for spell, share in sloped if _HOLDING[0] < share < _HOLDING[1]]
-    # On a slope on which the torques do not hold the vehicle they read their zeros.
-    released = [spell for spell, _ in sloped if spell not in holding]
+
+    def calm_of(some: list[slice]) -> list[slice]:
+        return resting(windows, torque, some, windows.torque_count, noise, allowed, stated)
+
+    calm = calm_of(stops)
+    holding, released = _on_slopes(windows, vehicle, torque, stops)
     level = 0.0  # N m: what may hold the vehicle unseen, where it is held on slopes
     if holding and not any(spell in released for spell in calm):
-        free = [spell for spell in stops if spell not in holding]
-        calm = resting(windows, torque, free, windows.torque_count, noise, allowed, stated)
+        calm = calm_of([spell for spell in stops if spell not in holding])
         if not calm:
             why = "at standstill on a slope the torques are those that hold the vehicle: stand with the motors off"
             return [], [Unknown(key, why)]
@@ -190,27 +189,39 @@ def torque_zeros(
             level = vehicle.uncertainty.assumed("pitch_offset") * vehicle.mass * GRAVITY
             level *= float(vehicle.wheel_radius.mean()) / len(driven)
     if not calm:
-        least = min(
-            (stop_means(torque, spell) for spell in stops), key=lambda mean: np.max(np.abs(mean) - allowed)
-        )
-        held = [
-            Unknown(
-                f"{key} {wheel}",
-                f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle",
-            )
-            for wheel, value, most in zip(wheels, least, allowed, strict=True)
-            if abs(value) > most
-        ]
-        return [], held or [Unknown(key, _ONE_SHORT_STOP)]
+        means = [stop_means(torque, spell) for spell in stops]
+        return [], _held_by(wheels, means, allowed) or [Unknown(key, _ONE_SHORT_STOP)]
+    entry = evidence(windows, rows_of(calm), sources, windows.torque_count)
+    sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
     quantities = []
     for wheel, values in zip(wheels, torque.T, strict=True):
         value, error = spell_mean(values, calm, windows.torque_count, noise)
-        sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
-        entry = evidence(windows, rows_of(calm), sources, windows.torque_count)
-        quantities.append(
-            Quantity(key, value, float(np.hypot(error, level)), "N m", entry, sentence, wheel=wheel)
-        )
+        error = float(np.hypot(error, level))
+        quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
     return quantities, []
+
+
+def _held_by(wheels: Sequence[str], means: Sequence[Floats], allowed: Floats) -> list[Unknown]:
+    """Which wheels' drives read more than ``allowed`` (k,) at the stop of the least torque, of ``means`` (k,) of each stop."""
+    least = min(means, key=lambda mean: np.max(np.abs(mean) - allowed))
+    return [
+        Unknown(
+            f"drive_torque_offset {wheel}",
+            f"at standstill the drive reads {value:.2f} N m, so it seems to hold the vehicle",
+        )
+        for wheel, value, most in zip(wheels, least, allowed, strict=True)
+        if abs(value) > most
+    ]
+
+
+def _on_slopes(
+    windows: Windows, vehicle: Vehicle, torque: Floats, stops: Sequence[slice]
+) -> tuple[list[slice], list[slice]]:
+    """The stops on a measured slope at which the torques hold the vehicle, and those at which they do not and read their zeros."""
+    shares = [(spell, _held_share(windows, vehicle, torque, spell)) for spell in stops]
+    holding = [spell for spell, share in shares if _HOLDING[0] < share < _HOLDING[1]]
+    released = [spell for spell, share in shares if np.isfinite(share) and spell not in holding]
+    return holding, released
 
 
 def _held_share(windows: Windows, vehicle: Vehicle, torque: Floats, spell: slice) -> float:
