@@ -7,7 +7,11 @@ from terragrip.errors import InputError
 HEAD = 1 << 16  # bytes that are looked at
 _BINARY = bytes(range(9)) + bytes(range(14, 32)) + b"\x7f"
 _MAGIC = (
-    (b"PK\x03\x04", "is a zip or an Excel workbook", "save the sheet as CSV"),
+    (
+        b"PK\x03\x04",
+        "is a zip, an Excel workbook or NumPy's npz",
+        "save the sheet as CSV; an npz is read as tg.read(dict(numpy.load(FILE)))",
+    ),
     (b"\xd0\xcf\x11\xe0", "is an old Excel workbook", "save the sheet as CSV"),
     (b"MDF ", "is an MDF measurement", "export it as CSV or Parquet"),
     (b"UnFinMF ", "is an unfinished MDF measurement", "export it as CSV or Parquet"),

@@ -200,7 +200,7 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         ("t;v;w\n0;1;5\n", "column time: is missing; map the log's columns in a profile"),
         ("time,ground_speed,wheel_speed_l,ground_speed\n0,1,5,1\n", "column ground_speed: occurs twice"),
         ("time,ground_speed [N],wheel_speed_l\n0,1,5\n", "column ground_speed: 'N' measures a force, where a speed is"),
-        (b"PK\x03\x04 rest", "is a zip or an Excel workbook; save the sheet as CSV"),
+        (b"PK\x03\x04 rest", "is a zip, an Excel workbook or NumPy's npz; save the sheet as CSV"),
         (b"\x89HDF\r\n\x1a\n", "is a damaged MATLAB file, or none"),
         (b"\x00\x01\x02\x03binary", "is not a table of text; give a CSV or Parquet file"),
         (b"\x1f\x8b\x08\x00broken", "is a damaged gzip file"),

@@ -692,3 +692,13 @@ def test_the_sides_of_one_machine_are_no_machines() -> None:
     proposals = _propose(columns)
     assert proposals.namespace == ""
     assert {f"wheel_speed_{w}" for w in ("fl", "fr", "rl", "rr")} <= proposals.keys()
+
+
+@pytest.mark.parametrize(
+    ("column", "is_soil"), [("Boden", True), ("ground", True), ("Suelo", True), ("GPS fix", False)]
+)
+def test_a_text_by_the_name_of_the_ground_is_the_soils_label(column: str, is_soil: bool) -> None:
+    """German, French and Spanish logs had no labels proposed, so no curves."""
+    texts = {column: np.array(["field", "track"] * (len(TIME) // 2), dtype=object)}
+    proposals = propose({"speed": SPEED}, texts, {}, {"speed": TIME})
+    assert ("soil" in proposals) == is_soil

@@ -38,15 +38,18 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         source = _chosen(name, origin, log, may_lack=origin.optional or partial)
         if source is not None:
             channels[name] = source
-            if len(origin.chain) > 1 or len(origin.candidates) > 1 or any("*" in c for c in origin.columns):
-                notes.append(f"{name} is from {', '.join(source.columns)}.")
-    notes += _of_other_axes(channels.get("ground_speed"), log)
-    if silent := efforts(channels) if _are_zero(efforts(channels).values(), log) else {}:
+    silent = efforts(channels) if _are_zero(efforts(channels).values(), log) else {}
+    if silent:
         columns = ", ".join(source.columns[0] for source in silent.values())
         notes.append(
             f"{columns} hold nothing but 0, as drivers do that measure no torque: {', '.join(silent)} are left out."
         )
         channels = {name: source for name, source in channels.items() if name not in silent}
+    for name, source in channels.items():
+        origin = profile.channels[name]
+        if len(origin.chain) > 1 or len(origin.candidates) > 1 or any("*" in c for c in origin.columns):
+            notes.append(f"{name} is from {', '.join(source.columns)}.")
+    notes += _of_other_axes(channels.get("ground_speed"), log)
     absent = [name for name in profile.channels if name not in channels and name not in silent]
     if absent and not partial:
         notes.append(f"The log has no {', '.join(absent)}, optional in the profile.")

@@ -30,6 +30,7 @@ from terragrip.vehicle import Vehicle
 Texts = Mapping[str, npt.NDArray[Any]]
 
 _OF_WHEELS = ("wheel_speed", "drive_torque")
+_GROUNDS = frozenset(["ground", "boden", "bodenart", "untergrund", "sol", "suelo", "terreno", "suolo"])
 
 
 class Proposals(dict[str, Proposal]):
@@ -119,7 +120,8 @@ def _proposed(
     }
     add_indirect(proposals, numbers, columns, plane)
     for name in texts:
-        if name in LABELS or vocabulary.read(name).has("soil"):
+        read = vocabulary.read(name)  # of texts the ground is a label: a speed over it is none
+        if name in LABELS or read.has("soil") or not _GROUNDS.isdisjoint(read.words):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
     named = {_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()}
     result = Proposals({channel: _held_against(vehicle, channel, p) for channel, p in named.items()})

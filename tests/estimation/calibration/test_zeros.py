@@ -202,8 +202,9 @@ def test_nothing_to_calibrate_from_and_foreign_logs_are_refused(drive: Make, veh
     with pytest.raises(InputError, match="no recording"):
         calibrate([], vehicle)
     log = drive(20)
-    with pytest.raises(InputError, match="str is no recording"):
-        calibrate(log.to_pandas(), vehicle)  # its columns' names come one by one
+    for wrong in (log.to_pandas(), None):
+        with pytest.raises(InputError, match=f"{type(wrong).__name__} is no recording; give what tg.read"):
+            calibrate(wrong, vehicle)
     channels = {name.replace("_fl", "_xx"): values for name, values in log.channels.items()}
     with pytest.raises(InputError, match="no wheel xx"):
         calibrate(Recording(log.time, channels), vehicle)

@@ -76,7 +76,9 @@ def calibrate(
     ------
     InputError: there is no log, or one does not fit the vehicle.
     """
-    logs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    given: Any = recordings
+    several = hasattr(given, "__iter__") and not hasattr(given, "columns")  # of a table they are names
+    logs: list[Any] = list(given) if several else [given]
     if strange := [one for one in logs if not isinstance(one, Recording)]:
         raise InputError(
             f"{type(strange[0]).__name__} is no recording",
