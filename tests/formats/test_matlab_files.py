@@ -275,3 +275,21 @@ def test_our_own_estimates_are_no_log(tmp_path: Path) -> None:
     for reader in (read, inspect):
         with pytest.raises(InputError, match=r"e\.mat: holds estimates, not a log"):
             reader(tmp_path / "e.mat")
+
+
+@pytest.mark.parametrize("nested", ["", "log/"])
+def test_units_among_the_attributes_of_hdf5_are_used(tmp_path: Path, nested: str) -> None:
+    """As netCDF and xarray write them; km/h were m/s and milliseconds seconds without a word."""
+    path = tmp_path / "log.h5"
+    units = {"ground_speed": "km/h", "time": np.bytes_("ms"), "latitude": "degrees_north"}
+    with h5py.File(path, "w") as file:
+        for name, values in {"time": 1000 * TIME, **OURS, "latitude": 50 + 0 * TIME}.items():
+            dataset = file.create_dataset(nested + name, data=values)
+            if name in units:
+                dataset.attrs["units"] = units[name]
+    table = read_table(path)
+    prefix = nested.replace("/", ".")
+    assert table.units == {f"{prefix}ground_speed": "km/h", f"{prefix}latitude": "degrees"}
+    assert np.allclose(table.columns["time"], TIME)
+    if not nested:
+        assert np.allclose(read(path)["ground_speed"], SPEED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,17 @@ def is_hdf5(path: str) -> bool:
 
 def tree_of(file: Any, h5py: Any) -> dict[str, Any]:
     """The variables of an open file by name: mapping (struct), list (cell), text, `Array` or `Opaque`."""
-    return {name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")}
+    tree = {name: _of_hdf5(file, item, 0, h5py) for name, item in file.items() if not name.startswith("#")}
+    return _with_units(file, tree)
+
+
+def _with_units(group: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    """A group's parts and, as a struct of units beside them, what the attributes ``units`` of its datasets state, as netCDF has them."""
+    stated = {name: group[name].attrs.get("units") for name in parts}
+    texts = {n: u.decode("utf-8", "replace") if isinstance(u, bytes) else u for n, u in stated.items()}
+    # degrees_north; a netCDF's time is in "seconds since ..."
+    units = {n: re.sub("_(north|east)$| since .*", "", u) for n, u in texts.items() if isinstance(u, str)}
+    return {"units": units, **parts} if units else parts
 
 
 def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
@@ -36,7 +47,7 @@ def _of_hdf5(file: Any, item: Any, depth: int, h5py: Any) -> Any:
         parts = {name: _of_hdf5(file, part, depth + 1, h5py) for name, part in item.items()}
         if _is_struct_array(item, parts, h5py):
             return [dict(zip(parts, one, strict=True)) for one in zip(*parts.values(), strict=True)]
-        return parts
+        return _with_units(item, parts)
     if not isinstance(item, h5py.Dataset) or "MATLAB_empty" in item.attrs:
         return None
     kind = item.attrs.get("MATLAB_class", b"")
