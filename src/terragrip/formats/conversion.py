@@ -21,23 +21,15 @@ from terragrip.formats.derivation import (
     roll_of,
     yaw_of,
 )
-from terragrip.formats.profile_parts import Rows, Source, TimeSource, matching, rate_unit
+from terragrip.formats.profile_parts import Rows, Source, matching, rate_unit
 from terragrip.formats.signals import SAME, union
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable
+from terragrip.formats.time_base import time_base
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
 from terragrip.recording.checks import PLACES, refuse_place
-from terragrip.recording.columns import (
-    DAY,
-    SINCE_1970,
-    SPREADSHEET_1970,
-    numbers,
-    seconds,
-    stamps_of,
-    start_of,
-    texts,
-)
+from terragrip.recording.columns import numbers, texts
 from terragrip.recording.frames import frame_of
 from terragrip.recording.repeats import merged
 from terragrip.recording.schema import LABELS, TIME, unit_of
@@ -85,7 +77,7 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
     columns, repeats = merged({n: c for n, c in log.columns.items() if n in wanted}, profile.time.column)
     log = replace(log, columns=columns)
     notes += repeats.notes()
-    time, start, remarks = _time(profile.time, log)
+    time, start, remarks = time_base(profile.time, log)
     notes += remarks
     channels: dict[str, Column] = {}
     noise: dict[str, float] = {}
@@ -170,47 +162,11 @@ def converted_block(profile: Profile, block: LogTable, first: Any) -> dict[str, 
         shifted = (stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps) - first
         block = replace(block, columns={**block.columns, profile.time.column: shifted})
     zero = profile.time.model_copy(update={"zero": None})
-    time, _, _ = _time(zero, block)
+    time, _, _ = time_base(zero, block)
     return {
         TIME: time,
         **{name: _channel(name, origin, block, time)[0] for name, origin in profile.channels.items()},
     }
-
-
-def _time(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list[str]]:
-    """The time base [s], when its zero was [s since 1970] if that is known, and the notes on it."""
-    stamps = written = stamps_of(log.columns[origin.column], log.source, origin.column, origin.dates)
-    notes: list[str] = []
-    start = log.start
-    if stamps.dtype.kind in "Mm":
-        time, notes = seconds(stamps, log.source)
-        start = start_of(stamps, time)
-    else:
-        if origin.zero == "first" and stamps.dtype.kind in "iu" and len(stamps):
-            stamps = stamps.astype(np.int64) - np.int64(stamps[0])  # nanoseconds since 1970 need all 64 bits
-        time = numbers(origin.column, stamps, None, log.source) * factor_to(origin.unit, "s")
-        if start is None:
-            start = _since_1970(written, origin)
-    if origin.zero == "first" and len(time):
-        time = time - time[0]
-    return time, start, notes
-
-
-def first_start(origin: TimeSource, stamps: Column) -> float | None:
-    """When time 0 was [s since 1970] of a log whose first stamps (n,) these are, if they say."""
-    if stamps.dtype.kind in "Mm":
-        return start_of(stamps, np.empty(0))
-    return _since_1970(stamps, origin)
-
-
-def _since_1970(stamps: Column, origin: TimeSource) -> float | None:
-    """When time 0 was [s since 1970], where the stamps (n,), numbers, are so large that they count from then."""
-    unit = factor_to(origin.unit, "s")
-    first = float(stamps[0]) * unit if len(stamps) else np.nan
-    if not SINCE_1970 < first < np.inf:
-        return None
-    before = SPREADSHEET_1970 * unit if unit == DAY else 0.0
-    return (first if origin.zero == "first" else 0.0) - before
 
 
 def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Column, float | None]:

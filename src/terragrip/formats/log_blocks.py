@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.errors import InputError
-from terragrip.formats.conversion import asked, converted_block, first_start, settled
+from terragrip.formats.conversion import asked, converted_block, settled
 from terragrip.formats.profile import Profile
 from terragrip.formats.reading import loaded, read
 from terragrip.formats.registry import format_of
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable, in_si
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
+from terragrip.formats.time_base import first_start
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
