@@ -95,6 +95,7 @@ PAGES = (
     ("No soil of the library fits", "ground#limits"),
     ("of the drive shows the ground", "ground#limits"),
     ("too short for vehicle and tool", "ground#limits"),
+    ("may be a tool's, lowered or raised", "ground#a-tools-changes"),
     ("s behind the wheels and are shifted by it", "maps#what-a-cell-holds"),
     ("of the positions, ", "maps#what-a-cell-holds"),
     ("of the positions cut", "maps#what-a-cell-holds"),

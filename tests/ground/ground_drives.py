@@ -28,7 +28,9 @@ VEHICLE: dict[str, Any] = {
     },
     "wheel": {"radius": "0.2 m", "inertia": "0.27 kg m^2"},
     "tire_rolling_resistance": 0.03,
+    "uncertainty": {"drawbar_force": 0},
 }
+"""Tows nothing, by its file and by the channels of `drive`."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,13 @@ GRASS, FINE, COARSE = Ground(0.4, 0.07), Ground(0.85, 0.12), Ground(0.9, 0.14, 0
 
 
 def drive(
-    seed: int, pieces: Sequence[tuple[str, Ground, float]], speed: float = 0.6, **about: Any
+    seed: int,
+    pieces: Sequence[tuple[str, Ground, float]],
+    speed: float = 0.6,
+    wander: float = 0.1,
+    **about: Any,
 ) -> Estimates:
-    """Estimates along pieces (label, ground, seconds) at constant speed; slip wanders by 10 % about its mean."""
+    """Estimates along pieces (label, ground, seconds) at constant speed; slip wanders by `wander` about its mean."""
     rng = np.random.default_rng(seed)
     rows = [int(seconds * RATE) for *_, seconds in pieces]
     n = sum(rows)
@@ -64,7 +70,7 @@ def drive(
 
     slow = np.repeat(rng.standard_normal(n // 10 + 1), 10)[:n]
     resistance = each("resistance") + each("varies") * slow + each("rough") * rng.standard_normal(n)
-    slip = each("slip") + 0.1 * np.sin(time / 7 + seed)
+    slip = each("slip") + wander * np.sin(time / 7 + seed)
     columns = {
         "distance": speed * time,
         "ground_speed": np.full(n, speed),
@@ -85,7 +91,13 @@ def drive(
             f"adhesion_{wheel}": mu + 2 * each("rough") * rng.standard_normal(n),
             f"adhesion_{wheel}_std": np.full(n, 0.01),
         }
-    made = {"method": "bank", "smooth": False, "vehicle": Vehicle.from_dict(VEHICLE).to_dict(), **about}
+    made = {
+        "method": "bank",
+        "smooth": False,
+        "vehicle": Vehicle.from_dict(VEHICLE).to_dict(),
+        "settings": {"channels": ["ground_speed"]},
+        **about,
+    }
     return Estimates(time, columns, np.zeros(n, dtype=np.uint8), {"soil": label}, made)
 
 

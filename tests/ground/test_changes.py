@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from dataclasses import replace
 from itertools import combinations
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from ground_drives import COARSE, FINE, GRASS, Ground, drive, thinned
+from ground_drives import COARSE, FINE, GRASS, VEHICLE, Ground, drive, thinned
 from terragrip.errors import InputError
 from terragrip.ground import changes as changes_module
+from terragrip.ground.analysis import analyse
 from terragrip.ground.changes import LEAST, _borders, _Cost, changes_of
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
@@ -25,6 +27,7 @@ from terragrip.ground.signals import GROUND, curve_scale, signals_of
 from terragrip.ground.steps import A_LENGTH, joined, steps_of
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
+from terragrip.vehicle import Vehicle
 
 USUAL = noise_of(np.zeros((0, 4)), GROUND)
 
@@ -84,6 +87,54 @@ def test_pull_alone_is_no_change():
         assert changes_of(blocks) == ()
         assert OnlineChanges().update(blocks) == []
         assert changes_of(blocks, ("slip", "adhesion"))
+
+
+def under(ground: Ground, pull: float) -> Ground:
+    """The ground where so much (pull over weight) is asked for beside its resistance: forces balance."""
+    slip = np.linspace(0, 0.6, 601)
+    mu = CURVES["exponential"].value(slip, {"a": ground.a})
+    return replace(ground, slip=float(np.interp(ground.resistance + pull, mu, slip)))
+
+
+SOFT, RUTTED = Ground(0.5, 0.07), Ground(0.85, 0.13, rough=0.012)
+CASES = [  # the ground before, the ground after, what is known of the pull, whose the change may be
+    (under(SOFT, 0.1), under(RUTTED, 0.1), "measured", "ground"),
+    (under(SOFT, 0.1), under(RUTTED, 0.1), "unknown", "ground"),
+    (under(RUTTED, 0.05), under(replace(RUTTED, rough=0.003), 0.25), "measured", "tool or ground"),
+    (under(SOFT, 0.1), under(replace(SOFT, resistance=0.16), 0.1), "unknown", "tool or ground"),
+    (under(SOFT, 0.1), under(replace(SOFT, resistance=0.16), 0.1), "none", "ground"),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "pull", "cause"), CASES)
+def test_a_change_that_a_tool_may_have_made_says_so(before, after, pull, cause):
+    """A plough that comes in raises the pull, where that is measured; else the resistance, along the curve of one ground."""
+    for seed in range(4):
+        estimates = drive(seed, [("one", before, 40), ("other", after, 40), ("one", before, 40)], wander=0.02)
+        blocks = estimates_blocks(estimates)
+        for changes in (changes_of(blocks, pull=pull), OnlineChanges(pull=pull).update(blocks)):
+            assert {change.cause for change in changes} == {cause}
+
+
+@pytest.mark.parametrize(
+    ("channels", "stated", "note"),
+    [
+        (["drawbar_force"], {}, None),
+        (["ground_speed"], {}, "2 of 2 changes may be a tool's.*write 'uncertainty: {drawbar_force: 0}'"),
+        (["ground_speed"], {"drawbar_force": 100}, "2 of 2 changes may be a tool's"),
+        (["ground_speed"], {"drawbar_force": 0}, None),
+    ],
+)
+def test_a_note_counts_the_changes_that_may_be_a_tools(channels, stated, note):
+    """Resistance alone changes: the ground's where the pull is measured and stays, or nothing is towed."""
+    vehicle = Vehicle.from_dict({**VEHICLE, "uncertainty": stated}).to_dict()
+    one, other = CASES[3][:2]
+    pieces = [("one", one, 40), ("other", other, 40), ("one", one, 40)]
+    ground, _ = analyse(drive(1, pieces, wander=0.02, vehicle=vehicle, settings={"channels": channels}))
+    counted = [one for one in ground.notes if "may be a tool's" in one]
+    assert bool(counted) == (note is not None)
+    assert note is None or re.search(note, counted[0])
+    assert {one.cause for one in ground.changes} == {"ground" if note is None else "tool or ground"}
 
 
 def test_noise_is_the_estimates_own_and_the_grounds():

@@ -14,6 +14,7 @@ from terragrip.ground.live import GroundState, LiveGround
 from terragrip.live import read_record
 from terragrip.live.core import Core, Settings
 from terragrip.live.options import Options
+from terragrip.live.outputs import Event
 from terragrip.live.pipeline import Pipeline
 from terragrip.live.service import Service
 from terragrip.soil.library import Soil, SoilLibrary
@@ -83,9 +84,24 @@ async def test_soils_and_changes_are_published(tmp_path, recording, library, veh
     reported = [state.change.time for state in by_hand[1] if state.change is not None]
     assert [change["time"] for change in changes] == reported
     assert min(abs(time - 20.0) for time in reported) < 1.0
-    assert len(events(service, "ground_change")) == len(reported)
+    assert {change["cause"] for change in changes} == {"ground"}
+    texts = events(service, "ground_change")
+    assert len(texts) == len(reported)
+    assert all(text.startswith("the ground changed at") for text in texts)
     soils = [message.data for message in seen if message.kind == "soil"]
     assert [(soil["time"], soil["soil"], soil["probabilities"]) for soil in soils] == [
         (state.time, state.soil, state.probabilities) for state in by_hand[1]
     ]
     assert soils[-1]["probability"] == max(soils[-1]["probabilities"].values())
+
+
+def test_without_a_drawbar_force_a_change_may_be_a_tools(recording, vehicle):
+    channels = tuple(name for name in recording.channels if name != "drawbar_force")
+    core, got = Core(vehicle, Settings(("replay:test",), channels=channels, ground=True)), []
+    for time, values in rows_of(recording):
+        got += core.process(time, 0, time, {name: values[name] for name in channels if name in values})
+    changes = [out.change for out in got if isinstance(out, GroundState) and out.change is not None]
+    texts = [out.text for out in got if isinstance(out, Event) and out.kind == "ground_change"]
+    nearest = int(np.argmin([abs(change.time - 20.0) for change in changes]))
+    assert changes[nearest].cause == "tool or ground"  # resistance alone
+    assert texts[nearest].startswith("the ground, or a tool, changed at")

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates
+from terragrip.estimation.provenance import measures
+from terragrip.ground.causes import OR_TOOL, Pull, pull_of
 from terragrip.ground.changes import LENGTH, Change, changes_of
 from terragrip.ground.emissions import Emissions
 from terragrip.ground.events import events
@@ -51,7 +53,8 @@ def analyse(
     chosen = settings or Settings()
     blocks = estimates_blocks(estimates, file=run or None)
     length = whole_length(estimates.vehicle)
-    changes = _changes(blocks, chosen, length / A_LENGTH)
+    pull = pull_of(estimates.vehicle, measures(estimates.about, "drawbar_force"))
+    changes = _changes(blocks, chosen, length / A_LENGTH, pull)
     emissions = Emissions(library.recognisable if library is not None else {}, maker(estimates), length)
     forward = ForwardFilter(emissions).update(blocks)
     probabilities = by_soil(forward.filtered if chosen.online else forward.smoothed(), emissions.states)
@@ -70,7 +73,10 @@ def analyse(
         sections,
         events(estimates),
         timeline,
-        _notes(emissions, timeline, len(stretches) - len(sections), library),
+        (
+            *_notes(emissions, timeline, len(stretches) - len(sections), library),
+            *_tool_notes(changes, pull),
+        ),
         {"recording": estimates.about.get("recording", {}), "online": chosen.online},
     )
     return ground, with_columns(estimates, blocks, timeline, chosen.online)
@@ -108,10 +114,10 @@ def _soils(timeline: Timeline) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys(named) if (named == name).mean() >= 0.02)
 
 
-def _changes(blocks: Blocks, settings: Settings, step: float) -> tuple[Change, ...]:
+def _changes(blocks: Blocks, settings: Settings, step: float, pull: Pull) -> tuple[Change, ...]:
     if not settings.online:
-        return changes_of(blocks, settings.signals, settings.length, step)
-    return tuple(OnlineChanges(step, settings.length, settings.signals).update(blocks))
+        return changes_of(blocks, settings.signals, settings.length, step, pull)
+    return tuple(OnlineChanges(step, settings.length, settings.signals, pull).update(blocks))
 
 
 def _stretches(estimates: Estimates, changes: Sequence[Change], timeline: Timeline) -> list[Stretch]:
@@ -165,3 +171,18 @@ def _notes(
             f"Only {100 * known.mean():.0f} % of the drive shows the ground; elsewhere the last soil is assumed."
         )
     return tuple(notes)
+
+
+def _tool_notes(changes: Sequence[Change], pull: Pull) -> tuple[str, ...]:
+    count = sum(change.cause == OR_TOOL for change in changes)
+    if not count:
+        return ()
+    why = (
+        "the pull changed more than the resistance."
+        if pull == "measured"
+        else "without drawbar_force its pull is part of soil_resistance. If nothing is towed, write 'uncertainty: {drawbar_force: 0}' in "
+        "the vehicle file and estimate again."
+    )
+    return (
+        f"{count} of {len(changes)} changes may be a tool's, lowered or raised, and not the ground's: {why}",
+    )

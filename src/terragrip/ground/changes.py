@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from terragrip.arrays import Floats
 from terragrip.errors import missing_package
+from terragrip.ground.causes import LEVELS, OR_TOOL, Pull, cause_of, signs_of
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
@@ -38,6 +39,7 @@ class Change:
     """The ground changes at `time` [s], known to `std` [s], with `probability`.
 
     `shift`: by how many SDs (of a step on one ground) each signal moved. `reported` [s]: when it was known while driving, None afterwards.
+    `cause`: `causes.GROUND_ALONE` or `causes.OR_TOOL`; "": read from an older file.
     """
 
     time: float
@@ -45,12 +47,20 @@ class Change:
     probability: float
     shift: Mapping[str, float] = field(default_factory=dict)
     reported: float | None = None
+    cause: str = ""
+
+    @property
+    def subject(self) -> str:
+        """What changed, in words."""
+        return "the ground, or a tool," if self.cause == OR_TOOL else "the ground"
 
     def to_dict(self) -> dict[str, Any]:
         """As ground.json holds it."""
         out: dict[str, Any] = {"time": self.time, "std": self.std, "probability": self.probability}
         if self.reported is not None:
             out["reported"] = self.reported
+        if self.cause:
+            out["cause"] = self.cause
         return {**out, "shift": dict(self.shift)} if self.shift else out
 
     @classmethod
@@ -60,13 +70,17 @@ class Change:
 
 
 def changes_of(
-    blocks: Blocks, names: Sequence[str] = GROUND, length: float = LENGTH, step: float = 0.0
+    blocks: Blocks,
+    names: Sequence[str] = GROUND,
+    length: float = LENGTH,
+    step: float = 0.0,
+    pull: Pull = "measured",
 ) -> tuple[Change, ...]:
     """The changes of a whole drive.
 
     `names`: which of `signals.SIGNALS` to look at. `length` [m]: mean way on one ground before the data speak, which with
     the drive's own speed is the price of a change. `step` [m]: way that blocks are put together over (`steps.A_LENGTH` of the vehicle's
-    length); 0: none. Raises InputError where ruptures is not installed.
+    length); 0: none. `pull`: what is known of the drawbar force. Raises InputError where ruptures is not installed.
     """
     steps, _, _ = steps_of(blocks, step)
     every = signals_of(steps, tuple(names))
@@ -80,6 +94,8 @@ def changes_of(
     noise = noise_of(signals, names)
     cost = _Cost(signals, Model.of(names, noise))
     ends = [0, *_borders(cost, price), len(signals)]
+    signs = signs_of(steps)
+    levels = noise_of(signs[:, :2], LEVELS).within
     return tuple(
         _change(
             cost,
@@ -87,6 +103,7 @@ def changes_of(
             dict(zip(names, noise.within, strict=True)),
             (before, border, after),
             np.exp(-price / 2),
+            cause_of(signs[before:border], signs[border:after], levels, pull),
         )
         for before, border, after in zip(ends, ends[1:], ends[2:], strict=False)
     )
@@ -160,7 +177,12 @@ def _pelt(cost: _Cost, begin: int, end: int, price: float) -> list[int]:
 
 
 def _change(
-    cost: _Cost, steps: Blocks, within: Mapping[str, float], place: tuple[int, int, int], chance: float
+    cost: _Cost,
+    steps: Blocks,
+    within: Mapping[str, float],
+    place: tuple[int, int, int],
+    chance: float,
+    cause: str,
 ) -> Change:
     """The change at `border` between its neighbours: where it may lie, and how probable it is that there is one at all."""
     before, border, after = place
@@ -180,4 +202,4 @@ def _change(
         one, other = (part[np.isfinite(part)] for part in (signal[before:border], signal[border:after]))
         if one.size and other.size:
             shift[name] = round(float(other.mean() - one.mean()) / sd, 2)
-    return Change(time, float(np.sqrt(variance)), float(1 / (1 + np.exp(-odds))), shift)
+    return Change(time, float(np.sqrt(variance)), float(1 / (1 + np.exp(-odds))), shift, cause=cause)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from terragrip.errors import InputError
+from terragrip.ground.causes import pull_of
 from terragrip.ground.changes import Change
 from terragrip.ground.emissions import Emissions
 from terragrip.ground.online_changes import OnlineChanges
@@ -25,7 +26,7 @@ from terragrip.soil.library import SoilLibrary
 if TYPE_CHECKING:
     from terragrip.estimation import Estimate, TractionEstimator
 
-_VERSION = 2
+_VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,15 @@ class GroundState:
     change: Change | None
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it; of the change how certain it is."""
+        """As JSON holds it; of the change how certain it is, and its cause."""
         change = self.change
         return {
             "time": self.time,
             "soil": self.soil,
             "probability": self.probabilities[self.soil],
             "probabilities": dict(self.probabilities),
-            "change": change and {"time": change.time, "std": change.std, "probability": change.probability},
+            "change": change
+            and {name: getattr(change, name) for name in ("time", "std", "probability", "cause")},
         }
 
 
@@ -77,7 +79,8 @@ class LiveGround:
             library.recognisable if library is not None else {}, estimator.method, length
         )
         self._filter = ForwardFilter(self._emissions)
-        self._changes = OnlineChanges(length / A_LENGTH)
+        pull = pull_of(estimator.vehicle, "drawbar_force" in estimator.channels)
+        self._changes = OnlineChanges(length / A_LENGTH, pull=pull)
         self._origin: float | None = None
         self._number = 0
         self._before: tuple[int, int] | None = None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from terragrip.arrays import Floats
+from terragrip.ground.causes import LEVELS, Pull, cause_of, signs_of
 from terragrip.ground.changes import LENGTH, Change
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
@@ -33,12 +34,20 @@ _EACH = ("_probability", "_age")
 class OnlineChanges:
     """Receives blocks in order and reports changes; `probability` is that of a change within the last steps.
 
-    `step`, `length` [m] and `names` as of `changes.changes_of`.
+    `step`, `length` [m], `names` and `pull` as of `changes.changes_of`.
     """
 
-    def __init__(self, step: float = 0.0, length: float = LENGTH, names: tuple[str, ...] = GROUND) -> None:
-        self._step, self._length, self._names = step, length, names
+    def __init__(
+        self,
+        step: float = 0.0,
+        length: float = LENGTH,
+        names: tuple[str, ...] = GROUND,
+        pull: Pull = "measured",
+    ) -> None:
+        self._step, self._length, self._names, self._pull = step, length, names, pull
         self._signals = np.zeros((0, len(names)))
+        self._signs, self._starts = np.zeros((0, 4)), np.zeros(0)
+        self._last = -np.inf  # time of the change before
         self._prior()
         self._mean, self._count, self._shape, self._scale = (x[None, :].copy() for x in self._fresh)
         self._probability = np.ones(1)
@@ -56,8 +65,10 @@ class OnlineChanges:
         steps, rest, self._from = steps_of(every, self._step, self._from)
         self._pending = rest if len(rest) else None
         result = []
-        signals = signals_of(steps, self._names)
+        signals, signs = signals_of(steps, self._names), signs_of(steps)
         for k in range(len(steps)):
+            self._signs = np.vstack([self._signs[1 - _MOST :], signs[k]])
+            self._starts = np.append(self._starts[1 - _MOST :], steps.start[k])
             change = self._add(
                 signals[k], float(steps.start[k]), float(steps.end[k]), float(steps.travelled[k])
             )
@@ -72,6 +83,9 @@ class OnlineChanges:
             **{name: getattr(self, name).tolist() for name in (*_RUNS, *_EACH)},
             "_begin": _plain(self._begin),
             "signals": _plain(self._signals),
+            "signs": _plain(self._signs),
+            "starts": self._starts.tolist(),
+            "last": self._last if np.isfinite(self._last) else None,
             "travelled": self._travelled,
             "quiet": self._quiet,
             "pending": None if pending is None else {k: _plain(v) for k, v in vars(pending).items()},
@@ -84,6 +98,9 @@ class OnlineChanges:
         for name in (*_RUNS, *_EACH, "_begin"):
             setattr(self, name, np.array(state[name], dtype=float))
         self._signals = np.array(state["signals"], dtype=float).reshape(-1, len(self._names))
+        self._signs = np.array(state["signs"], dtype=float).reshape(-1, 4)
+        self._starts = np.array(state["starts"], dtype=float)
+        self._last = -np.inf if state["last"] is None else float(state["last"])
         self._prior()
         self._travelled, self.probability = state["travelled"], float(state["probability"])
         self._quiet, self._from = int(state["quiet"]), state["from"]
@@ -152,7 +169,11 @@ class OnlineChanges:
         self._quiet = 0
         took = now - float(self._begin[-1])
         std = float(np.sqrt((weight * (at - time) ** 2).sum() + took**2 / 12))
-        return Change(time, std, self.probability, reported=now)
+        within = noise_of(self._signs[:, :2], LEVELS).within
+        before, after = self._starts >= self._last, self._starts >= time
+        cause = cause_of(self._signs[before & ~after], self._signs[after], within, self._pull)
+        self._last = time
+        return Change(time, std, self.probability, reported=now, cause=cause)
 
 
 def _plain(values: NDArray[Any]) -> list[Any]:

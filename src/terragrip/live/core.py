@@ -226,7 +226,7 @@ class Core:
                 if state is not None:
                     out.append(state)
                     if (change := state.change) is not None:
-                        text = f"the ground changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
+                        text = f"{change.subject} changed at {change.time:.1f} ± {change.std:.1f} s, probability {change.probability:.2f}"
                         out.append(Event(state.time, "ground_change", "ground", text))
             if self.learner is not None:
                 self._learn(estimator, self.learner, row, out)

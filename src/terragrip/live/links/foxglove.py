@@ -48,7 +48,7 @@ _PROPERTIES: dict[str, dict[str, Any]] = {
         "event": _TEXT,
         "predicted": {"type": "boolean", "description": "nothing was measured: the filter predicted"},
     },
-    GROUND: {"time": _TIME, "std": _NUMBER, "probability": _NUMBER},
+    GROUND: {"time": _TIME, "std": _NUMBER, "probability": _NUMBER, "cause": _TEXT},
     SOIL: {
         "time": _TIME,
         "soil": _TEXT,
