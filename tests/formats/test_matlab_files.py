@@ -196,6 +196,13 @@ def test_a_struct_of_units_beside_the_signals_is_used(tmp_path: Path, version: s
     assert np.allclose(read(path, Profile.from_dict({"channels": names}))["ground_speed"], SPEED)
 
 
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_a_struct_of_units_counts_for_series_with_time_and_data(tmp_path: Path, version: str) -> None:
+    series = {"ground_speed": {"Time": TIME, "Data": 3.6 * SPEED}}
+    table = read_table(saved(tmp_path / "log.mat", version, {**series, "units": {"ground_speed": "km/h"}}))
+    assert table.units == {"ground_speed": "km/h"}
+
+
 @pytest.mark.parametrize("version", ["v7", "v73"])
 def test_the_units_of_a_tables_variables_are_used(shared: Callable[[str], Path], version: str) -> None:
     table = read_table(shared("data/ingest_samples/matlab") / f"test_tables_{version}.mat")

@@ -154,9 +154,12 @@ def _add_those_beside(
             contents.signals[_joined(name, key)] = clocks[length], texts, None
         elif length is not None:
             plain = key.lower() in _DATA and name
+            own = name if plain else _joined(name, key)
             stated = _value(struct, _UNITS) if plain else None
-            unit = stated if isinstance(stated, str) and is_common(stated) else units.get(key)
-            _add(contents, name if plain else _joined(name, key), clocks[length], part, length, unit)
+            unit = (
+                stated if isinstance(stated, str) and is_common(stated) else units.get(own.rpartition(".")[2])
+            )
+            _add(contents, own, clocks[length], part, length, unit)
         elif (max(part.shape) > first / 2 or is_own(key)) and (texts is not None or _is_vector(part)):
             # shorter ones of other names are parameters
             contents.odd[_joined(name, key)] = max(part.shape), first
