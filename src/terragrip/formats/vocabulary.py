@@ -229,25 +229,13 @@ class Vocabulary:
         last = words_of(re.split(r"[./]", body)[-1])  # of a struct's field, less the structs it is in
         text = words[: len(words) - used] or words
         text = [word for word in text if word not in _OF_MESSAGES or word in last]
-        letter, index = text[-2:] if len(last) - used == 2 else ("", "")
-        concepts = {"time"} if text == ["t"] else set()
-        if letter in _AXIS_SYMBOLS and index in ("x", "y", "z"):
-            text = [*text[:-2], letter + index]  # a_z
-        elif letter in _SYMBOLS and (index in _CORNERS or index in "lr12345678"):
-            concepts.add(_SYMBOLS[letter])  # M1, w_rl, log.n_fl
-            text = [*text[:-2], index]
+        text, concepts = _symbol_at_end(text) if len(last) - used == 2 else (text, set())
+        axis, meant = self._meant(text)
+        concepts |= meant
+        if text == ["t"]:
+            concepts.add("time")
         if len(words) > 1 and unit in ("rpm", "rev/s"):
             concepts.add("rotation")
-        axis = ""
-        for word in text:
-            short = None if word in self._known else _SYMBOL_OF_AXIS.match(word)
-            if short is not None:
-                concepts.add(_AXIS_SYMBOLS[short[1][0]])
-                axis = short[2]
-            elif word in ("x", "y", "z"):
-                axis = word
-            else:
-                concepts |= self.concepts_of(word)
         if text and text[0] in _SYMBOLS and concepts & {"wheel", "motor"}:
             concepts.add(_SYMBOLS[text[0]])  # nRadVL
         if "speed" in concepts and words and words[-1] in _COMPASS:
@@ -257,6 +245,20 @@ class Vocabulary:
             unit = "kn"  # speed_kn: knots, no force
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
+
+    def _meant(self, text: list[str]) -> tuple[str, set[str]]:
+        """The axis that a name's words state, and what the others mean."""
+        axis, concepts = "", set()
+        for word in text:
+            short = None if word in self._known else _SYMBOL_OF_AXIS.match(word)
+            if short is not None:
+                concepts.add(_AXIS_SYMBOLS[short[1][0]])
+                axis = short[2]
+            elif word in ("x", "y", "z"):
+                axis = word
+            else:
+                concepts |= self.concepts_of(word)
+        return axis, concepts
 
     def _parted(self, name: str) -> tuple[str, str | None]:
         """A name without the unit or remark at its end, and that unit; a word in brackets is the name's (``Speed (GPS)``)."""
@@ -303,6 +305,16 @@ def _is_cut(word: str, bare: bool, full: str, concept: str) -> bool:
 
 
 GENERAL = Vocabulary()
+
+
+def _symbol_at_end(text: list[str]) -> tuple[list[str], set[str]]:
+    """A name that ends in a letter and its index: one word with its axis (a_z), else without the letter; and what that means."""
+    letter, index = text[-2:]
+    if letter in _AXIS_SYMBOLS and index in ("x", "y", "z"):
+        return [*text[:-2], letter + index], set()
+    if letter in _SYMBOLS and (index in _CORNERS or index in "lr12345678"):
+        return [*text[:-2], index], {_SYMBOLS[letter]}  # M1, w_rl, log.n_fl
+    return text, set()
 
 
 def words_of(name: str) -> list[str]:

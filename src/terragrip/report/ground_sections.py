@@ -147,7 +147,7 @@ def events(
 ) -> Section:
     """What happened, with start, end and the reason in the user's words.
 
-    found: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
+    result: events of the estimates themselves by run (kind, start, end, why), for the runs that no `grounds` tells of.
     """
     title = "Events"
     with_time = {ground.run for ground in grounds}
