@@ -22,6 +22,7 @@ KEYS: dict[type[BaseModel], dict[str, str]] = {
         "rows": "keep only these rows",
         "payload": "how a live source packs its numbers; JSON without it",
         "dbc": "DBC files of a CAN log, from the profile's folder",
+        "namespace": "of several machines in a log the one that is meant, e.g. `/r2`: its columns lie inside",
         "channels": "by the recording's [channel](channels.md): a name, a list of names, or the keys of a channel below",
     },
     TimeSource: {
