@@ -299,7 +299,7 @@ def test_pitch_and_roll_from_a_quaternion() -> None:
         ("{constant: grass}", "{constant: a, from: b}", "channels.soil (line 9)", "needs exactly one source", ""),
         ("unit: ms", "unit: m", "time.unit (line 2)", "measures a length, where a time is needed", "'s'"),
         ("[900, 1000]", "[900, 1000, 2]", "channels.drive_torque_l.invalid", "", ""),
-        ("unit: km/h", "window: 1 s", "channels.ground_speed.window (line 7)", "works with derivative_of only", "leave it out"),
+        ("{constant: grass}", "{constant: grass, window: 1 s}", "channels.soil.window (line 9)", "works with derivative_of, or", "leave"),
         ("from: kmh", "derivative_of: [a], forward: {yaw: y}", "channels.ground_speed.forward", "needs derivative_of two", ""),
         ("name: test rig", "delay: 3", "delay (line 1)", "unknown key", ""),
     ],

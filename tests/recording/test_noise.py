@@ -85,6 +85,12 @@ def test_the_error_of_rounding_is_found_in_a_slow_channel_too() -> None:
     assert rounding_noise(values) == pytest.approx(0.05 / np.sqrt(12))
 
 
+def test_few_steps_are_off_by_half_of_one() -> None:
+    """Pulses counted in each row, three or four: the error is one more or less, not that of rounding."""
+    angle = np.cumsum(np.full(4000, 3.4))
+    assert rounding_noise(0.7 * np.diff(np.floor(angle))) == pytest.approx(0.35)
+
+
 def test_what_is_not_rounded_and_set_points_have_no_error_of_rounding() -> None:
     rng = np.random.default_rng(0)
     time = np.arange(0, 60, 0.01)

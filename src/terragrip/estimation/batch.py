@@ -20,6 +20,7 @@ from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
 from terragrip.recording.alignment import aligned
+from terragrip.recording.counted import refuse_counted
 from terragrip.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ def estimated(
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)
     known = survey_of(log, passes.of(0) if log.from_disk else None)
     passes.rows = known.rows
+    refuse_counted(known.sample)
     alone = speeds_alone(known.sample.channels, vehicle)
     if not alone:
         known.sample.check_against(vehicle)

@@ -73,13 +73,18 @@ def settings_in(
 
 
 def rounded_noise(recording: Recording, vehicle: Vehicle) -> dict[str, float]:
-    """By channel the SD that the vehicle file gives, with what the log's rounding adds to it (docs/decisions/0159); without the rest."""
+    """By channel the SD that the vehicle file gives, with what the log's rounding adds to it (docs/decisions/0159), or that of a derived
+    channel where it is more; without the rest."""
     from terragrip.recording import rounding_noise
 
     result = {}
     for name, values in recording.channels.items():
         stated = getattr(vehicle.sensors, sensor_of(name), None)
-        if stated is not None and (more := rounding_noise(values)) > 0:
+        if stated is None:
+            continue
+        if recording.noise.get(name, 0.0) > stated:
+            result[name] = recording.noise[name]
+        elif (more := rounding_noise(values)) > 0:
             result[name] = math.hypot(stated, more)
     return result
 

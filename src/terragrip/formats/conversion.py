@@ -86,8 +86,8 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
         if deviation is not None:
             noise[name] = deviation
             notes.append(
-                f"{name} is the derivative of {', '.join(origin.derivative_of or ())} over {origin.window:g} s, "
-                f"with a standard deviation of about {deviation:.2g} {unit_of(name)}."
+                f"{name} is the {'derivative' if origin.derivative_of else 'mean'} of {', '.join(origin.columns)} over "
+                f"{origin.window:g} s, with a standard deviation of about {deviation:.2g} {unit_of(name)}."
             )
         if origin.forward is not None:
             notes += _heading_notes(name, origin, log, time)
@@ -139,7 +139,7 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
     Of the log only names are looked at. Raises InputError as `bound` does.
     """
     for origin in profile.channels.values():
-        if any(one.derivative_of or one.over or one.delay for one in origin.chain):
+        if any(one.has_window or one.over or one.delay for one in origin.chain):
             return None
         if sum(_ways(one, log.names) for one in origin.chain) > 1:
             return None
@@ -195,6 +195,8 @@ def _channel(name: str, origin: Source, log: LogTable, time: Floats) -> tuple[Co
         raw = roll_of(_raw(origin.roll_of, log, time))
     else:
         raw = _without_invalid(_raw((str(origin.column),), log, time)[0], origin)
+        if origin.has_window:
+            raw, deviation = _mean(time, raw, origin.window)
         if origin.over is not None:
             divisor = _raw((origin.over,), log, time)[0]
             if log.clocked:
@@ -276,6 +278,15 @@ def _without_invalid(values: Floats, origin: Source) -> Floats:
         low, high = item if isinstance(item, tuple) else (item, item)
         bad |= (values >= low) & (values <= high)
     return np.where(bad, np.nan, values)
+
+
+def _mean(time: Floats, values: Floats, window: float) -> tuple[Floats, float | None]:
+    """The mean (n,) of a column around its own instants, each value that of the time since the one before, and its standard deviation."""
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
+    total = np.cumsum(values[known] * np.diff(time[known], prepend=time[known][:1]))
+    result = np.full(len(time), np.nan)
+    result[known], deviation = derivative(time[known], total, window)
+    return result, deviation
 
 
 def _rate(origin: Source, log: LogTable, time: Floats, turn: float | None) -> tuple[Floats, float | None]:

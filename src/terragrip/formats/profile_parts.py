@@ -82,9 +82,10 @@ class Source(Part):
     def _one_source(self) -> Self:
         if sum(getattr(self, key) is not None for key in ("column", *MADE_OF, "constant")) != 1:
             raise Fault("needs exactly one source", f"write one of from, {', '.join(MADE_OF)}, constant")
-        for key in ("window", "forward"):
-            if key in self.model_fields_set and self.derivative_of is None:
-                raise Fault("works with derivative_of only", "leave it out", (key,))
+        if self.forward is not None and self.derivative_of is None:
+            raise Fault("works with derivative_of only", "leave it out", ("forward",))
+        if "window" in self.model_fields_set and not self.has_window:
+            raise Fault("works with derivative_of, or with from alone", "leave it out", ("window",))
         if self.over is not None and self.column is None:
             raise Fault("serves from only", "leave it out", ("over",))
         if self.over is not None and self.over_minimum <= 0:
@@ -120,6 +121,12 @@ class Source(Part):
         """Whether it is the derivative of a latitude and a longitude."""
         angles = ("deg", "degree", "degrees", "°")
         return self.derivative_of is not None and len(self.derivative_of) == 2 and self.unit in angles
+
+    @property
+    def has_window(self) -> bool:
+        """Whether a row of it follows from rows around: a derivative, or the mean of a column over a ``window``."""
+        mean = "window" in self.model_fields_set and self.column is not None and self.over is None
+        return self.derivative_of is not None or mean
 
     @property
     def chain(self) -> tuple[Source, ...]:

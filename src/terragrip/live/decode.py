@@ -212,9 +212,9 @@ def _is_ours(name: str) -> bool:
 
 
 def _refuse_looking_ahead(name: str, source: Source) -> None:
-    if all(one.derivative_of is not None for one in source.chain) and not source.optional:
+    if all(one.has_window for one in source.chain) and not source.optional:
         raise InputError(
-            "derivative_of needs future samples, which do not exist live",
+            "a window needs future samples, which do not exist live",
             place=f"channels.{name}",
             hint="give a source of the speed itself",
         )

@@ -160,7 +160,7 @@ def _repeats(
     if step > _COARSE * size > 0.0 and _by_steps(what, step):
         return [
             f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
-            "one value. Log it in finer steps."
+            "one value. Log it in finer steps; of counted pulses, take the mean in a profile ('window: 1 s')."
         ]
     usable = what[first] != 0.0
     if forces and name != "drawbar_force":  # a motor is held at its limit, a load cell never
