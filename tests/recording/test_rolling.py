@@ -9,6 +9,8 @@ import pytest
 
 from development_machine import machine
 from terragrip.recording import Recording, unit_warnings
+from terragrip.recording.mechanics import means_of
+from terragrip.recording.rolling import light_warnings
 from terragrip.simulation import SimulationResult, families
 from terragrip.vehicle import Vehicle
 
@@ -134,3 +136,37 @@ def test_rims_that_go_slower_by_a_torque_of_hardly_anything_are_no_error(
     towed = {n: np.full(6000, torque) if n.startswith("drive_torque") else v for n, v in columns.items()}
     towed |= {n: 0.85 * v for n, v in columns.items() if n.startswith("wheel_speed")}
     assert not any("slower" in note for note in unit_warnings(Recording.from_frame(towed), vehicle))
+
+
+@pytest.mark.parametrize(("size", "said"), [(1.0, False), (1.2, True)])
+def test_a_tractors_front_wheels_go_further_in_a_headland_turn(size: float, said: bool) -> None:
+    """They hardly pull there, and by the vehicle's speed they slip by .06 in a turn of 5.5 m: right radii were to be checked."""
+    draws, time = np.random.default_rng(5), np.arange(0, 600, 0.1)
+    bend = np.convolve(
+        np.where(time % 60 > 45, np.where(time % 120 > 60, 1, -1) / 5.5, 0.0), np.ones(20) / 20, "same"
+    )
+    v = np.where(np.abs(bend) > 0.01, 1.1, 2.2)
+    v = np.convolve(np.pad(v, 15, "edge"), np.ones(31) / 31, "valid")
+    front = np.where(np.abs(bend) > 0.01, -0.02, 0.15) + 0.05 * np.sin(time / 3)
+    columns = {"time": time, "ground_speed": v + 0.01 * draws.standard_normal(len(time))}
+    for wheel, side, ahead, radius, load in (
+        ("fl", 0.9, 2.6, 0.62, 10e3), ("fr", -0.9, 2.6, 0.62, 10e3), ("rl", 0.9, 0.0, 0.8, 15e3), ("rr", -0.9, 0.0, 0.8, 15e3)
+    ):  # fmt: skip
+        mu = front if ahead else 0.2 + 0.0 * time
+        rim = np.hypot(v * (1 - side * bend), ahead * v * bend) / (1 - mu / 4) / radius
+        columns[f"wheel_speed_{wheel}"] = rim + 0.01 * draws.standard_normal(len(time))
+        columns[f"drive_torque_{wheel}"] = radius * load * (mu + 0.02) + 20 * draws.standard_normal(len(time))
+    tractor = Vehicle.from_dict(
+        {
+            "mass": 5100,
+            "wheelbase": 2.6,
+            "track": 1.8,
+            "center_of_gravity_height": 0.9,
+            "axles": {
+                "front": {"mass": 2040, "wheels": ["fl", "fr"], "steered": True, "wheel": {"radius": 0.62 * size, "inertia": 30}},
+                "rear": {"mass": 3060, "wheels": ["rl", "rr"], "wheel": {"radius": 0.8, "inertia": 120}},
+            },
+        }
+    )  # fmt: skip
+    log = Recording.from_frame(columns)
+    assert bool(light_warnings(log, tractor, means_of(log, tractor))) is said

@@ -36,6 +36,7 @@ _RADII = 4.0  # the usual track, if none is given
 _LEAST = 15  # windows straight ahead
 _STRAIGHT = 0.05  # of the speed from side to side
 _SLANT = 0.2  # of the sum of both sides' speeds
+_TURNED = 0.15  # rad: wheels steered by less go 1 % further than the vehicle
 _FEW = 30  # rows
 _UNLIKE = np.log(1.35)  # of an axle's two torques: beyond the gains that `calibrate` accepts
 _ALIKE = np.log(1.15)
@@ -81,9 +82,11 @@ def _correlation(a: Floats, b: Floats) -> float:
 
 
 def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
-    """Rows (n,) in which the rims of each axle have like speeds from side to side, so no turn moves one far from the ground speed; if
-    there are hardly any, those in which they turn the same way."""
+    """Rows (n,) in which the rims of each axle have like speeds from side to side, so no turn moves one, nor a steered one, far from the
+    ground speed; if there are hardly any, those in which they turn the same way."""
     rows, forward = np.ones((2, len(recording)), dtype=bool)
+    ahead = float(np.abs(vehicle.wheel_ahead).max())
+    side = dict(zip(vehicle.wheels, vehicle.wheel_side.tolist(), strict=True))
     for axle in vehicle.axles.values():
         sides = [
             (recording.channels.get(f"wheel_speed_{w}"), vehicle.radii[w])
@@ -91,7 +94,9 @@ def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
         ]
         rims = [r * filled(recording.time, speed) for speed, r in sides if speed is not None]
         if len(axle.wheels) > 1 and len(rims) == 2:
-            rows &= np.abs(rims[1] - rims[0]) < _SLANT * np.abs(rims[1] + rims[0])
+            track = abs(side[axle.wheels[0]] - side[axle.wheels[-1]])
+            slant = min(_SLANT, _TURNED * track / (2 * ahead)) if ahead * track > 0 else _SLANT
+            rows &= np.abs(rims[1] - rims[0]) < slant * np.abs(rims[1] + rims[0])
             forward &= rims[0] * rims[1] > 0
     return rows if rows.sum() > _FEW else forward
 
