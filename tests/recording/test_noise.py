@@ -89,6 +89,7 @@ def test_few_steps_are_off_by_half_of_one() -> None:
     """Pulses counted in each row, three or four: the error is one more or less, not that of rounding."""
     angle = np.cumsum(np.full(4000, 3.4))
     assert rounding_noise(0.7 * np.diff(np.floor(angle))) == pytest.approx(0.35)
+    assert rounding_noise(0.7 * np.diff(np.floor(angle)), 0.35) == pytest.approx(0.7 / np.sqrt(12))
 
 
 def test_what_is_not_rounded_and_set_points_have_no_error_of_rounding() -> None:

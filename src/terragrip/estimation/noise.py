@@ -84,7 +84,7 @@ def rounded_noise(recording: Recording, vehicle: Vehicle) -> dict[str, float]:
             continue
         if recording.noise.get(name, 0.0) > stated:
             result[name] = recording.noise[name]
-        elif (more := rounding_noise(values)) > 0:
+        elif (more := rounding_noise(values, stated)) > 0:
             result[name] = math.hypot(stated, more)
     return result
 

@@ -21,6 +21,7 @@ MAD_TO_SD = 1.482602218505602  # of a normal distribution
 _ROWS, _SAMPLES = 1000, 500  # of eight parts of a channel, and of those together: they show a resolution
 _RESTLESS = 0.1  # share of values unlike the one before: a channel that changes less often has set-points
 _COARSE = 1 / 6  # of a channel's size: larger steps are few
+_HIDDEN = 4.0  # times the noise: smaller steps change with it from row to row
 _NOT_SENSED = ("latitude", "longitude", "altitude", "fuel_rate")
 
 
@@ -76,11 +77,11 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     return max(scale, floor, 1e-4 * quantile(np.abs(usual_values(values)), 0.95))
 
 
-def rounding_noise(values: Floats) -> float:
+def rounding_noise(values: Floats, noise: float = 0.0) -> float:
     """Standard deviation q/√12 of the error that rounding to multiples of q gives a channel (n,), NaN = missing; 0 where it is not rounded.
 
-    By a sample of the values: all their differences are multiples of q. It is q/2 where a channel has few of them: that error lasts as
-    long as the value, and counted pulses err by one more or less.
+    By a sample of the values: all their differences are multiples of q. It is q/2 where a channel has few of them and the sensor's own
+    ``noise`` (SD) is far less: that error lasts as long as the value, and counted pulses err by one more or less.
     """
     last = max(len(values) - _ROWS, 0)
     part = np.concatenate([values[k : k + _ROWS] for k in np.unique(np.linspace(0, last, 8, dtype=int))])
@@ -88,4 +89,5 @@ def rounding_noise(values: Floats) -> float:
     if np.count_nonzero(np.diff(known)) <= _RESTLESS * len(known):
         return 0.0
     step = quantum(known[:: max(1, len(known) // _SAMPLES)])
-    return step / 2.0 if step > _COARSE * quantile(np.abs(known), 0.95) else step / float(np.sqrt(12.0))
+    lasts = step > max(_COARSE * quantile(np.abs(known), 0.95), _HIDDEN * noise)
+    return step / 2.0 if lasts else step / float(np.sqrt(12.0))
