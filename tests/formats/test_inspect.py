@@ -319,7 +319,7 @@ def test_a_vehicle_that_does_not_fit_is_not_called_ready(
     assert main(["inspect", *words]) == 0
     output = capsys.readouterr().out
     assert ("can be estimated as it is read" in output) == (why == "")
-    assert ("With this vehicle the log cannot be estimated" in output) == (why != "")
+    assert ("The log cannot be estimated as it is" in output) == (why != "")
     assert why in output
     # estimate says the same
     out = ["-o", str(tmp_path / "e.parquet"), "--quiet"]

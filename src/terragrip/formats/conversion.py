@@ -85,8 +85,9 @@ def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part
         channels[name], deviation = _channel(name, origin, log, time)
         if deviation is not None:
             noise[name] = deviation
+            what = "derivative" if origin.derivative_of else "mean"
             notes.append(
-                f"{name} is the {'derivative' if origin.derivative_of else 'mean'} of {', '.join(origin.columns)} over "
+                f"{name} is the {what} of {', '.join(origin.derivative_of or origin.candidates)} over "
                 f"{origin.window:g} s, with a standard deviation of about {deviation:.2g} {unit_of(name)}."
             )
         if origin.forward is not None:

@@ -26,6 +26,7 @@ from terragrip.formats.time_column import other_clocks
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.checks import NOTHING_TOWED, refuse_estimates
+from terragrip.recording.counted import refuse_counted
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
@@ -129,8 +130,8 @@ def inspect(
     unfit = ""
     if recording is not None:
         warnings += unit_warnings(recording, machine)
-        unfit = "" if machine is None else _unfit(recording, machine)
-        warnings += [unfit] * bool(unfit)
+        unfit = _unfit(recording, machine)
+        warnings += [unfit] * bool(unfit and f"{unfit}." not in warnings)
         log = log if chosen is None else _as_table(recording, log)
     seen = Seen.of(log, whole=every == 1)
     proposals = seen.proposals(GENERAL, machine)
@@ -192,9 +193,12 @@ def _notes_on(seen: Seen) -> list[str]:
     return notes
 
 
-def _unfit(recording: Recording, vehicle: Vehicle) -> str:
-    """Why a recording cannot be estimated with a vehicle; empty if it can."""
+def _unfit(recording: Recording, vehicle: Vehicle | None) -> str:
+    """Why a recording cannot be estimated, with a vehicle; empty if it can."""
     try:
+        refuse_counted(recording)
+        if vehicle is None:
+            return ""
         if has_torque(recording.channels):
             recording.check_against(vehicle)
         for wheel in recording.wheels:

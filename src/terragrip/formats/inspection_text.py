@@ -36,7 +36,7 @@ def text_of(inspection: Inspection) -> str:
     if inspection.refused:
         parts.append(f"{inspection.file} {inspection.refused}.")
     if inspection.ready and inspection.unfit:
-        parts.append(f"With this vehicle the log cannot be estimated: {inspection.unfit}.")
+        parts.append(f"The log cannot be estimated as it is: {inspection.unfit}.")
     elif inspection.ready:
         parts.append("The log can be estimated as it is read here.")
     else:

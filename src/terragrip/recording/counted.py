@@ -25,7 +25,8 @@ _PULSES, _SHORTEST = 5, 0.5  # in a window, and its least length [s]
 
 def counted_warnings(recording: Recording) -> list[str]:
     """A sentence on each wheel speed that is counted in pulses, of which a row has one or none."""
-    return [f"{name} {_problem(step)}; {_fix(name, window)}." for name, step, window in _counted(recording)]
+    found = _counted(recording)
+    return [f"column {name}: {_problem(step)}; {_fix(name, window)}." for name, step, window in found]
 
 
 def refuse_counted(recording: Recording) -> None:

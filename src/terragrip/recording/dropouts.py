@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
-from terragrip.recording.counted import counted_warnings
 from terragrip.recording.held import known_part
 from terragrip.recording.lag import measured
 from terragrip.recording.mechanics import Means
@@ -33,9 +32,7 @@ _LOST = 0.5  # of the usual pull: less is what soil and hills change
 
 def dropout_warnings(recording: Recording) -> list[str]:
     """Sentences on speeds that read 0 for long while others go on, on each torque that alone does, and on zeros between other values."""
-    counted = counted_warnings(recording)
-    zeros = [] if counted else _blinks(recording)
-    return _wheels(recording) + _ground(recording) + _torques(recording) + counted + zeros
+    return _wheels(recording) + _ground(recording) + _torques(recording) + _blinks(recording)
 
 
 def zero_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:

@@ -18,6 +18,7 @@ from terragrip.physics.slip import middle_speed
 from terragrip.recording.axles import axle_warnings, free_axle_warnings
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings, replay_warnings
+from terragrip.recording.counted import counted_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.frozen import cut_warnings, frozen_warnings
@@ -251,8 +252,9 @@ _EACH = (
     Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
     Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means), _WAY),
     Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
-    Check("frozen", lambda log: frozen_warnings(log.whole), _TIME, needs_wheels=False),
-    Check("dropouts", lambda log: dropout_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("counted", lambda log: counted_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("frozen", lambda log: frozen_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
+    Check("dropouts", lambda log: dropout_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
     Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
