@@ -41,6 +41,7 @@ from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.speed_ratios import drive_train_warnings, position_warnings, rim_warnings
+from terragrip.recording.steering import steering_warnings
 from terragrip.recording.torques import sign_warnings, torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
@@ -177,6 +178,7 @@ _EACH = (
         lambda log: slower_warnings(log.rows, log.vehicle, log.means, log.turn),
         (
             *_SPEEDS,
+            "steering",
             "exchanged wheels",
             "turn rate",
             "turn rate at rest",
@@ -188,6 +190,11 @@ _EACH = (
         ),
     ),
     Check("rescaled", lambda log: rescaled_warnings(log.as_measured, log.vehicle, log.turn, log.track), _WAY),
+    Check(
+        "steering",
+        lambda log: steering_warnings(log.rows, log.vehicle, log.turn),
+        (*_WAY, "reverse", "exchanged wheels", "turn rate"),
+    ),
     Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
     Check("uneven torques", lambda log: log.sides[1], (*_WAY, "rescaled")),
     Check("drive train", lambda log: drive_train_warnings(log.rows), _WAY, needs_wheels=False),

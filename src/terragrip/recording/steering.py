@@ -1,0 +1,63 @@
+"""An axle that steers and is not stated to: a sentence for the user, never an error.
+
+Wheels that steer go along their own path, which in a turn of curvature k is √(1 + (L k)²) times that of an axle that does not, L behind.
+Rims of another axle that keep to that ratio, and to 1 straight ahead, show it; on a machine that scrubs round they do not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Floats
+from terragrip.recording.ranks import median, quantile
+from terragrip.recording.turns import filled, windows
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+    from terragrip.vehicle import Vehicle
+
+_MOVING = 0.3  # of the speed that a twentieth of the drive exceeds
+_STRAIGHT, _TURN = 0.005, 0.03  # logarithm of the paths' ratio
+_FEWEST = 10  # windows of either
+# Of that logarithm, in this share of the turns: other slip of the axles in turns is less.
+_NEAR, _MOST = 0.4, 0.8
+
+
+def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
+    """A sentence where the first or last axle goes through turns as one that steers, and none is stated to; ``turn`` (n,) [rad/s]."""
+    every = list(vehicle.axles.items())
+    axles = every[0], every[-1]
+    needed = {"ground_speed", *(f"wheel_speed_{w}" for _, axle in axles for w in axle.wheels)}
+    states = len(every) < 2 or vehicle.articulated or any(axle.steered for _, axle in every)
+    if turn is None or states or not needed <= recording.channels.keys():
+        return []
+    ground = filled(recording.time, recording.channels["ground_speed"])
+    rims = [np.mean([_rim(recording, vehicle, w) for w in axle.wheels], axis=0) for _, axle in axles]
+    *rims, ground, rate = windows(recording.time, np.array([*rims, ground, turn]))
+    if not len(rate):
+        return []
+    pace = np.abs(ground)
+    moving = (rims[0] * ground > 0) & (rims[1] * ground > 0) & (pace > _MOVING * quantile(pace, 0.95))
+    path = np.log1p((vehicle.axle_to_rear[0] * rate[moving] / pace[moving]) ** 2) / 2
+    straight, turns = path < _STRAIGHT, path > _TURN
+    if min(straight.sum(), turns.sum()) < _FEWEST:
+        return []
+    for (name, axle), own, other in zip(axles, rims, rims[::-1], strict=True):
+        ratio = np.log(
+            (own / (other if axle.driven else ground))[moving]
+        )  # on a headland what is driven slips less
+        share = (ratio[turns] - median(ratio[straight])) / path[turns]
+        if np.mean(np.abs(share - 1.0) < _NEAR) > _MOST:
+            most = -np.expm1(-quantile(path[turns], 0.95))
+            return [
+                f"In turns the wheels of the axle {name} go faster than the others, as wheels that steer do: write 'steered: true' for it "
+                f"in the vehicle file, or slip is wrong there, its own by up to {most:.2f}."
+            ]
+    return []
+
+
+def _rim(recording: Recording, vehicle: Vehicle, wheel: str) -> Floats:
+    """Rim speed (n,) [m/s]."""
+    return vehicle.radii[wheel] * filled(recording.time, recording.channels[f"wheel_speed_{wheel}"])
