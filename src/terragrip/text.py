@@ -40,6 +40,10 @@ _MAGIC = (
         )
         for magic in (b"FMT, 128, 89", b"\xa3\x95\x80\x80\x59FMT")
     ),
+    *(
+        (magic, f"is packed by {name}", f"unpack it first: {name} -d FILE")
+        for magic, name in ((b"\x28\xb5\x2f\xfd", "zstd"), (b"\xfd7zXZ", "xz"), (b"BZh", "bzip2"))
+    ),
     (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
 )
 

@@ -202,6 +202,8 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         ("time,ground_speed [N],wheel_speed_l\n0,1,5\n", "column ground_speed: 'N' measures a force, where a speed is"),
         (b"PK\x03\x04 rest", "is a zip, an Excel workbook or NumPy's npz; save the sheet as CSV"),
         (b"\x89HDF\r\n\x1a\n", "is a damaged MATLAB file, or none"),
+        (b"\x28\xb5\x2f\xfd\x04", "is packed by zstd; unpack it first: zstd -d FILE"),
+        (b"\xfd7zXZ\x00", "is packed by xz; unpack it first: xz -d FILE"),
         (b"\x00\x01\x02\x03binary", "is not a table of text; give a CSV or Parquet file"),
         (b"\x1f\x8b\x08\x00broken", "is a damaged gzip file"),
         (gzip.compress(HEAD.encode(), mtime=0)[:-6], "is a damaged gzip file"),
