@@ -64,6 +64,7 @@ PAGES = (
     ("in reverse turns", "checks#signs-exchanged-channels-copies"),
     ("its sensor is dead", "checks#channels-that-are-dead-held-or-cut"),
     ("as wheels that steer do", "checks#signs-exchanged-channels-copies"),
+    ("of the driving the joint bends", "vehicle#machines-of-other-layouts"),
     ("if it is a trailer's", "vehicle#machines-of-other-layouts"),
     ("does not drive in crab", "formats#in-a-profile"),
     ("is wrong: check ", "formats#in-a-profile"),

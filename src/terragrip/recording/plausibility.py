@@ -41,7 +41,7 @@ from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.speed_ratios import drive_train_warnings, position_warnings, rim_warnings
-from terragrip.recording.steering import steering_warnings
+from terragrip.recording.steering import joint_warnings, steering_warnings
 from terragrip.recording.torques import sign_warnings, torque_warnings
 from terragrip.recording.track import Track, track_of
 from terragrip.recording.turn_rates import shown_turn, turn_rate_warnings
@@ -195,6 +195,7 @@ _EACH = (
         lambda log: steering_warnings(log.rows, log.vehicle, log.turn),
         (*_WAY, "reverse", "exchanged wheels", "turn rate"),
     ),
+    Check("joint", lambda log: joint_warnings(log.rows, log.vehicle, log.turn), (*_WAY, "exchanged wheels")),
     Check("sides", lambda log: log.sides[0], (*_WAY, "rescaled")),
     Check("uneven torques", lambda log: log.sides[1], (*_WAY, "rescaled")),
     Check("drive train", lambda log: drive_train_warnings(log.rows), _WAY, needs_wheels=False),
@@ -256,7 +257,7 @@ _EACH = (
         lambda log: light_warnings(log.rows, log.vehicle, log.means),
         (*_SPEEDS, *_FORCES, "torques", "balance", "slower"),
     ),
-    Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), _WAY),
+    Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), (*_WAY, "joint")),
     Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means), _WAY),
     Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
     Check("counted", lambda log: counted_warnings(log.whole), _TIME, needs_wheels=False),

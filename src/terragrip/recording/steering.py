@@ -1,4 +1,4 @@
-"""An axle that steers and is not stated to: a sentence for the user, never an error.
+"""An axle that steers and is not stated to, a joint that bends: sentences for the user, never errors.
 
 Wheels that steer go along their own path, which in a turn of curvature k is √(1 + (L k)²) times that of an axle that does not, L behind.
 Rims of another axle that keep to that ratio, and to 1 straight ahead, show it; on a machine that scrubs round they do not.
@@ -12,7 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled, windows
+from terragrip.recording.turns import SURE, filled, side_differences, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -23,6 +23,7 @@ _STRAIGHT, _TURN = 0.005, 0.03  # logarithm of the paths' ratio
 _FEWEST = 10  # windows of either
 # Of that logarithm, in this share of the turns: other slip of the axles in turns is less.
 _NEAR, _MOST = 0.4, 0.8
+_BENDS = 0.03  # of slip: more than slip itself differs by from side to side
 
 
 def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
@@ -56,6 +57,37 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
                 f"in the vehicle file, or slip is wrong there, its own by up to {most:.2f}."
             ]
     return []
+
+
+def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
+    """A sentence where the halves of an articulated vehicle turn by different rates while its joint bends: ``turn`` (n,) [rad/s] is that of
+    one of them. Without any the intervals hold what the rims differ by."""
+    wheels = {w for axle in vehicle.axles.values() for w in axle.wheels}
+    if (
+        turn is None
+        or not vehicle.articulated
+        or not {f"wheel_speed_{w}" for w in wheels} <= recording.channels.keys()
+    ):
+        return []
+    rims = {w: _rim(recording, vehicle, w) for w in wheels}
+    sides = side_differences(vehicle, rims)
+    if len(sides) < 2:
+        return []
+    first, last, pace = windows(
+        recording.time, np.array([sides[0], sides[-1], np.abs(np.mean(list(rims.values()), axis=0))])
+    )
+    if len(pace) < _FEWEST:
+        return []
+    moving, bending = pace > _MOVING * quantile(pace, 0.95), (first - last) / 2
+    off = np.abs(bending[moving]) / pace[moving]  # of a wheel's slip, half the track beside the middle
+    bends = off > _BENDS
+    # The turn grows as the joint bends; wheels that spin do not follow that.
+    if bends.sum() < _FEWEST or np.corrcoef(bending, np.gradient(first + last))[0, 1] < SURE:
+        return []
+    return [
+        f"In {np.mean(bends):.0%} of the driving the joint bends: front and rear then turn by different rates, of which the log has one, "
+        f"and slips of the other's wheels are off by up to {quantile(off, 0.95):.2f}, beyond their intervals. Leave these rows out."
+    ]
 
 
 def _rim(recording: Recording, vehicle: Vehicle, wheel: str) -> Floats:
