@@ -225,7 +225,9 @@ class Estimates:
         def whole(name: str) -> Estimates:
             # a column at a time, which threads only slow: a table of all of them beside their arrays would double the memory.
             file = pq.ParquetFile(name, pre_buffer=False)
-            return cls._of_columns(file.schema_arrow, lambda one: file.read([one], use_threads=False).column(0), name)
+            return cls._of_columns(
+                file.schema_arrow, lambda one: file.read([one], use_threads=False).column(0), name
+            )
 
         made: Self = opened(path, whole)
         return made
