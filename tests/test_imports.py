@@ -98,3 +98,10 @@ def test_a_circle_is_seen_wherever_the_import_stands(tmp_path: Path, inner: str,
     (root / "first.py").write_text("from package.second import two\none = 1")
     (root / "second.py").write_text(f"{inner}\ntwo = 2")
     assert bool(circle_in(import_graph(root))) is circle
+
+
+def test_no_file_is_longer_than_a_reader_keeps_in_mind() -> None:
+    sources = [*_ROOT.rglob("*.py"), *_ROOT.rglob("*.[ch]"), *(_ROOT.parents[1] / "kernel").rglob("*.[ch]")]
+    lines = {str(path): path.read_text().count("\n") for path in sources if path.name != "terragrip.h"}
+    assert len(lines) > 300
+    assert {name: count for name, count in lines.items() if count > 400} == {}
