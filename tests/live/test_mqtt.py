@@ -91,6 +91,31 @@ async def test_what_a_broker_retained_is_no_sample(tmp_path, vehicle, short, por
     assert not events(service, "clock_jump")
 
 
+@pytest.mark.parametrize(
+    ("source", "sink"),
+    [
+        ("mqtt://127.0.0.1/machine/#", "mqtt://127.0.0.1/machine/out"),
+        ("mqtt://localhost:1883/machine/+", "mqtt://127.0.0.1/machine?rate=5"),
+        ("zenoh:**/estimate", "zenoh:terragrip"),
+        ("udp://127.0.0.1:9870", "udp://127.0.0.1:9870"),
+    ],
+)
+async def test_a_sink_whose_estimates_a_source_would_receive_is_refused(vehicle, source, sink):
+    """They were measurements: rows were lost beside them, predictions were new ones, and the silence of the machine went unsaid."""
+    with pytest.raises(InputError) as caught:
+        Service(vehicle, [source], [sink])
+    assert str(caught.value).startswith(f"--sink {sink}: its messages would come back by {source}")
+
+
+async def test_a_source_beside_a_sink_of_the_same_broker_is_not_refused(vehicle):
+    at = "mqtt://127.0.0.1"
+    Service(
+        vehicle,
+        [f"{at}/machine/+", f"{at}/gnss", "zenoh:**/all"],
+        [f"{at}/machine/out", f"{at}/gnss", "zenoh:all"],
+    )
+
+
 async def test_a_broker_that_refuses_is_named_and_tried_again(tmp_path, vehicle, short, port, monkeypatch):
     service = Service(vehicle, [f"mqtt://127.0.0.1:{port}/m"], [f"mqtt://127.0.0.1:{port}/out"])
     async with running(service):

@@ -17,6 +17,7 @@ from terragrip.live.monitor import Monitor
 from terragrip.live.options import Options
 from terragrip.live.outbox import Outbox
 from terragrip.live.supervision import PAUSE, run_links
+from terragrip.live.topics import refuse_echo
 from terragrip.live.vehicle_run import VehicleRun
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Service(VehicleRun):
         ]
         core, setpoint = options.core(vehicle, self.source_names, channels)
         self.sinks = [open_sink(text, vehicle, core.columns) for text in sinks]
+        for text in sinks:
+            refuse_echo(text, sources)
         inbox = Inbox(capacity)
         self.outboxes = [Outbox(uri, inbox) for uri, _ in self.sinks]
         super().__init__(

@@ -1,8 +1,9 @@
-"""Topics that name a vehicle at one level: ``field/{vehicle}/sample``."""
+"""Topics that name a vehicle at one level, ``field/{vehicle}/sample``, and those of sinks that a source would receive."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 from terragrip.errors import InputError
 
@@ -21,22 +22,48 @@ def is_name(text: str) -> bool:
     return _NAME.fullmatch(text) is not None
 
 
+def refuse_echo(sink: str, sources: Iterable[str]) -> None:
+    """Raise InputError where what a sink sends would come back by one of the sources; each is a URI."""
+    scheme, where, levels = _parts(sink)
+    sent = [*(level for level in levels if level), "estimate"]
+    for source in sources:
+        by, there, wanted = _parts(source)
+        if (by, there) == (scheme, where) and (scheme == "udp" or _covers(wanted, sent)):
+            raise InputError(
+                f"its messages would come back by {source}", place=f"--sink {sink}",
+                hint="give it another prefix, or another topic to the source",
+            )  # fmt: skip
+
+
+def _parts(text: str) -> tuple[str, str, list[str]]:
+    """Scheme, host and the levels of the topic of a URI."""
+    scheme, _, rest = text.partition(":")
+    where, path = "", rest.split("?", 1)[0]
+    if path.startswith("//"):
+        where, _, path = path[2:].partition("/")
+    return scheme.lower(), where.replace("localhost", "127.0.0.1").removesuffix(":1883"), path.split("/")
+
+
+def _covers(wanted: list[str], sent: list[str]) -> bool:
+    """Whether a topic with wild cards of MQTT or Zenoh is also the one that is sent to."""
+    if not wanted or wanted[0] in ("#", "**"):
+        return not sent if not wanted else any(_covers(wanted[1:], sent[k:]) for k in range(len(sent) + 1))
+    alike = bool(sent) and (wanted[0] in ("+", "*", VEHICLE, sent[0]) or sent[0] == VEHICLE)
+    return alike and _covers(wanted[1:], sent[1:])
+
+
 class VehicleTopics:
     """The topics of a source. ``text``: its URI. Raises InputError unless ``{vehicle}`` is one whole level of the topic, once."""
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self._scheme, _, rest = text.partition(":")
-        where, path = "", rest.split("?", 1)[0]
-        if path.startswith("//"):
-            where, _, path = path[2:].partition("/")
-        self._where, levels = where, path.split("/")
+        scheme, _, levels = _parts(text)
         if levels.count(VEHICLE) != 1 or text.count(VEHICLE) != 1:
             raise InputError(
                 f"{VEHICLE} is not one whole level of the topic", place=text, hint=f"write mqtt://HOST/field/{VEHICLE}/sample"
             )  # fmt: skip
         self._levels, self._level = levels, levels.index(VEHICLE)
-        self._one, self._any = ("*", "**") if self._scheme.lower() == "zenoh" else ("+", "#")
+        self._one = "*" if scheme == "zenoh" else "+"
         self._known: dict[str, tuple[str, str]] = {}
 
     @property
@@ -59,15 +86,3 @@ class VehicleTopics:
                 self._known.clear()
             known = self._known[topic] = name, general
         return known
-
-    def matches(self, sink: VehicleTopics) -> bool:
-        """Whether what is sent one level below a sink's topics of the same server comes by this source."""
-        if (self._scheme, self._where) != (sink._scheme, sink._where):
-            return False
-        sent = [*(level for level in sink._levels if level), "estimate"]
-        for k, level in enumerate(self._levels):
-            if level == self._any:
-                return True
-            if k >= len(sent) or (level not in (self._one, VEHICLE, sent[k]) and sent[k] != VEHICLE):
-                return False
-        return len(sent) == len(self._levels)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from terragrip.errors import InputError
 from terragrip.live.links import Sink, open_sink
 from terragrip.live.many.vehicles import Vehicles
-from terragrip.live.topics import VEHICLE, VehicleTopics
+from terragrip.live.topics import VEHICLE, VehicleTopics, refuse_echo
 from terragrip.live.uri import Uri
 
 _BY_TOPIC = ("mqtt", "mqtts", "zenoh")
@@ -62,13 +62,8 @@ def open_sinks(sinks: Sequence[str], sources: Sequence[VehicleTopics]) -> list[t
     for text in sinks:
         scheme = text.partition(":")[0].lower()
         if scheme in _BY_TOPIC:
-            topics = VehicleTopics(text)
-            for source in sources:
-                if source.matches(topics):
-                    raise InputError(
-                        f"its messages would come back by {source.text}", place=f"--sink {text}",
-                        hint="give it another prefix, or another topic to the source",
-                    )  # fmt: skip
+            VehicleTopics(text)
+            refuse_echo(text, (source.text for source in sources))
         elif scheme != "studio":
             raise InputError(
                 "cannot tell vehicles apart", place=f"--sink {text}", hint=f"write mqtt://HOST/field/{VEHICLE}, zenoh: or studio:"
