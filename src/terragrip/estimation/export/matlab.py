@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,13 +26,14 @@ class MatFile:
 
     def __init__(self, path: Path, first: Estimates, target: Path) -> None:
         self._path, self._first = path, first
-        self._parts: dict[str, list[Any]] = {name: [] for name in first.names}
+        self._columns = {name: array("d") for name in first.names}
         self._texts: dict[str, dict[str, int]] = {name: {} for name in ("event", *first.labels)}
 
     def write(self, part: Estimates) -> None:
         """Keep the rows of a part: a struct is written whole."""
-        for name, parts in self._parts.items():
-            parts.append(self._coded(name, part) if name in self._texts else part[name])
+        for name, column in self._columns.items():
+            values = self._coded(name, part) if name in self._texts else part[name]
+            column.frombytes(np.ascontiguousarray(values, dtype=np.float64).view(np.uint8).data)
 
     def _coded(self, name: str, part: Estimates) -> Any:
         """A column of texts as numbers (n,) from 1."""
@@ -42,9 +44,7 @@ class MatFile:
         """Write the file."""
         from scipy.io import savemat
 
-        columns: dict[str, Any] = {}
-        for name in self._first.names:  # joined one by one, so that no column is in memory twice for long
-            columns[name] = np.concatenate(self._parts.pop(name))[:, None]
+        columns = {name: np.frombuffer(column)[:, None] for name, column in self._columns.items()}
         meanings = {name: column_named(name) for name in self._first.names}
         content = {
             "estimates": columns,
@@ -58,7 +58,7 @@ class MatFile:
 
     def drop(self) -> None:
         """Nothing was written."""
-        self._parts.clear()
+        self._columns.clear()
 
 
 def _cell(texts: Collection[str]) -> Any:

@@ -11,10 +11,15 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
 
 
+_ROWS = 5000  # as texts at a time: each cell is an object
+
+
 def json_rows(part: Estimates, names: Sequence[str]) -> Iterator[str]:
     """Each row's named columns as a JSON object; what is missing is null."""
     template = "{" + ",".join(f"{json.dumps(name).replace('%', '%%')}:%s" for name in names) + "}"
-    return (template % row for row in zip(*(_cells(part[name]) for name in names), strict=True))
+    for first in range(0, len(part), _ROWS):
+        rows = part.select(slice(first, first + _ROWS))
+        yield from (template % row for row in zip(*(_cells(rows[name]) for name in names), strict=True))
 
 
 def _cells(values: Any) -> list[str]:
