@@ -135,6 +135,8 @@ def test_a_note_counts_the_changes_that_may_be_a_tools(channels, stated, note):
     assert bool(counted) == (note is not None)
     assert note is None or re.search(note, counted[0])
     assert {one.cause for one in ground.changes} == {"ground" if note is None else "tool or ground"}
+    drawn = [line.get_linestyle() for line in ground.plot().axes[0].lines if line.get_marker() == "None"]
+    assert drawn == ["-" if note is None else ":"] * 2
 
 
 def test_noise_is_the_estimates_own_and_the_grounds():

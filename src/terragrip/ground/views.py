@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.figures import INK, MUTED, ORANGE, notebook_figure, soil_color, styled
+from terragrip.ground.causes import OR_TOOL
 from terragrip.ground.span import Span
 from terragrip.html import figure_of, html_notes, html_table
 
@@ -49,7 +50,7 @@ def html_of(ground: Ground) -> str:
 
 def draw_soils(axes: Axes, ground: Ground) -> None:
     """The probabilities of the soils over time, stacked, "unknown" on top, each with its name for a legend; the changes as lines, as dark
-    as they are probable, with their standard deviations."""
+    as they are probable, dotted where a tool may be the cause, with their standard deviations."""
     timeline = ground.timeline
     soils = sorted(timeline.names, key=lambda name: name == "unknown")
     if len(timeline.time):
@@ -60,7 +61,8 @@ def draw_soils(axes: Axes, ground: Ground) -> None:
         )
     for change in ground.changes:
         dark = max(min(change.probability, 1.0), 0.1)
-        axes.axvline(change.time, color=INK, linewidth=1.0, alpha=dark)
+        line = ":" if change.cause == OR_TOOL else "-"
+        axes.axvline(change.time, color=INK, linewidth=1.0, linestyle=line, alpha=dark)
         axes.axvspan(
             change.time - change.std, change.time + change.std, color=INK, alpha=0.2 * dark, linewidth=0
         )
@@ -78,7 +80,7 @@ def plot(ground: Ground) -> Figure:
         draw_soils(axes, ground)
         if len(ground.timeline.time):
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        axes.set_title("soil; lines: changes ± SD")
+        axes.set_title("soil; lines: changes ± SD, dotted: or a tool")
         kinds = sorted({event.kind for event in ground.events})
         for event in ground.events:
             below.barh(

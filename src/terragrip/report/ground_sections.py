@@ -62,8 +62,9 @@ def recognised(
         picture = Picture(
             f"ground-{_stem(ground.run)}",
             draw_probabilities(ground, clocks.get(ground.run, Clock())),
-            f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground found in the estimates, "
-            f"as dark as they are probable, with their standard deviations.{strip} Where two soils look alike, they share the probability.",
+            f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground in the estimates, "
+            f"as dark as they are probable, dotted where a tool may be the cause, with their standard deviations.{strip} Where two soils "
+            "are alike, they share the probability.",
             f"Probabilities of soils over time in {ground.run}",
         )
         content.append(picture)
