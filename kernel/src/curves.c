@@ -1,8 +1,9 @@
 /* The adhesion curve of each wheel and of the vehicle, from a row's estimates. */
 #include "estimator.h"
 
-/* s. Neighbouring estimates are alike over far longer, so that those in between would teach nothing new. */
-#define TG_CURVE_STEP ((tg_real)0.05)
+/* s. Neighbouring estimates are alike over far longer, so that those in between would teach nothing new. A little under one row of 20 Hz,
+ * or five of 100: else the rounding of stamps would decide which rows count. */
+#define TG_CURVE_STEP ((tg_real)0.0495)
 
 void tgi_reset_curves(tg_estimator *e)
 {
