@@ -222,6 +222,37 @@ def test_a_scale_that_only_the_user_knows_is_asked_for_and_the_choice_is_that_of
     page.wait_for_selector("[aria-label='Scale of drive_torque_rr'][value='3']", state="attached")
 
 
+def test_a_column_chosen_by_hand_comes_with_its_own_unit_and_is_nothing_else_besides(
+    page: Any, served: Served, folder: Path
+) -> None:
+    """200 mm/s of a test rig were 200 m/s, seconds were read as the ms of the time before, and the turning wheel stayed the yaw rate."""
+    import yaml
+
+    n = np.arange(400)
+    log = {"Uptime [ms]": 50 * n, "Clock [s]": 100 + n / 20, "omega_rad_s": 1.5 + n / 1000}
+    log |= {"carriage_mm_s": 200 + n % 3, "speed of something": 0.2 + n / 1e5}
+    pd.DataFrame(log).to_csv(folder / "rig.csv", index=False)
+    page.goto(f"{served.url}/#/start?log=rig.csv")
+    page.wait_for_selector("#column-ground_speed")
+    assert (page.input_value("#time-column"), page.input_value("#time-unit")) == ("Uptime", "ms")
+    assert page.input_value("#column-angular_velocity_z") == "omega_rad_s"  # what turns, of an unknown part
+    page.select_option("#time-column", "Clock")
+    page.select_option("#column-wheel_speed_fl", "omega_rad_s")
+    page.select_option("#column-ground_speed", "carriage_mm_s")
+    page.select_option("#column-wheel_speed_fr", "speed of something")
+    assert page.input_value("#column-angular_velocity_z") == ""
+    assert "no unit is stated" in page.inner_text("[data-channel=wheel_speed_fr] .why")
+    page.select_option("#column-wheel_speed_fr", "")
+    page.click("#use-columns")
+    page.wait_for_selector("#wizard-profile option[value='rig-profile.yaml']", state="attached")
+    profile = yaml.safe_load((folder / "rig-profile.yaml").read_text())
+    assert profile["time"] == {"from": "Clock"}
+    assert profile["channels"] == {
+        "wheel_speed_fl": {"from": "omega_rad_s", "unit": "rad/s"},
+        "ground_speed": {"from": "carriage_mm_s", "unit": "mm/s"},
+    }
+
+
 def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
     page: Any, served: Served, folder: Path, foreign: Path, made: Path
 ) -> None:

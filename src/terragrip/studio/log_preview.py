@@ -38,12 +38,14 @@ class LogPreview:
     outlines: dict[str, Outline]
 
     def columns(self) -> list[dict[str, Any]]:
-        """Every column, for a choice: name, kind, unit, numbers, outline."""
+        """Every column, for a choice: name, kind, unit (the file's, else as its name ends), numbers, outline."""
+        from terragrip.formats.vocabulary import GENERAL
+
         return [
             {
                 "name": one.name,
                 "kind": one.kind,
-                "unit": one.unit,
+                "unit": one.unit or (GENERAL.read(one.name).unit if one.kind == "number" else None),
                 "missing": one.missing_share,
                 "minimum": one.minimum,
                 "median": one.median,

@@ -280,7 +280,7 @@ export class LogPage {
         found,
         h("p", { class: ready ? "good" : "bad" }, this.verdict(result)),
         ready ? null : this.namesMissing(),
-        result.warnings.map((text) => h("p", { class: "hint" }, text)),
+        result.warnings.filter((text) => !result.problem?.endsWith(text)).map((text) => h("p", { class: "hint" }, text)),
         h("details", {}, h("summary", {}, "Contents"), h("pre", { tabindex: "0" }, result.text)),
       );
       go.disabled = !ready;

@@ -1,11 +1,11 @@
 /** The columns of a foreign log, and which channel each becomes: proposals with their reason, unit, sign and a small plot. */
 
 import { get, send } from "../ui/api";
-import { digits, fill, h } from "../ui/dom";
+import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { numberField } from "../ui/number";
+import { chosenByHand, plot, rangeOf, type Column } from "./column";
 import { draftOf, keepDraft } from "./draft";
-import { svg } from "./sketch";
 import { WheelNames } from "./wheels";
 
 type Entry = Record<string, unknown>;
@@ -26,18 +26,6 @@ interface Channel {
   wheel: string;
   unit: string | null;
   proposals: Proposal[];
-}
-
-interface Column {
-  name: string;
-  kind: string;
-  unit: string | null;
-  missing: number;
-  minimum: number | null;
-  median: number | null;
-  maximum: number | null;
-  examples: string[];
-  outline: ([number, number] | null)[] | null;
 }
 
 export interface Look {
@@ -224,14 +212,20 @@ export class Mapping {
     const isOwn = Boolean(time.from) && !look.columns.some((column) => column.name === time.from); // each signal was stamped: MATLAB, CAN, ROS
     const select = h("select", { id: "time-column" }, isOwn ? h("option", { value: String(time.from), selected: true }, "the log's own times") : h("option", { value: "" }, "– choose –"), look.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
     const unit = h("input", { type: "text", id: "time-unit", class: "unit", value: String(time.unit ?? "s"), "aria-label": "Unit of the time" });
+    const why = h("p", { class: "why hint" }, isOwn ? "each signal has its times in the log" : look.time ? "runs forward" : "No column looks like time: choose it.");
     const update = (): void => {
       look.time = { ...(look.time ?? {}), from: select.value };
       if (unit.value.trim() && unit.value.trim() !== "s") look.time.unit = unit.value.trim();
       else delete look.time.unit;
     };
-    select.addEventListener("change", update);
+    select.addEventListener("change", () => {
+      const column = look.columns.find((one) => one.name === select.value);
+      unit.value = column?.unit ?? "s"; // not that of the column before
+      why.textContent = column ? chosenByHand(column, "s") : "";
+      update();
+    });
     unit.addEventListener("change", update);
-    return h("div", { class: "map-row" }, h("label", { for: select.id, class: "channel" }, "time"), select, unit, h("span"), h("span"), h("p", { class: "why hint" }, isOwn ? "each signal has its times in the log" : look.time ? "runs forward" : "No column looks like time: choose it."));
+    return h("div", { class: "map-row" }, h("label", { for: select.id, class: "channel" }, "time"), select, unit, h("span"), h("span"), why);
   }
 
   private row(channel: Channel): HTMLElement {
@@ -275,7 +269,7 @@ export class Mapping {
       choice && channel.unit ? this.unit(channel, choice, proposal, column) : h("span"),
       choice && channel.unit ? this.sign(channel, choice) : h("span"),
       column ? plot(column, choice?.entry.sign === -1) : h("span"),
-      h("p", { class: "why hint" }, reason(choice, proposal, column, choice && kept?.column === choice.column ? this.profile : "")),
+      h("p", { class: "why hint" }, reason(choice, proposal, column, channel.unit, choice && kept?.column === choice.column ? this.profile : "")),
     );
   }
 
@@ -315,6 +309,18 @@ export class Mapping {
     const kept = this.kept.get(channel.name);
     const entry = kept?.column === column ? { ...kept.entry } : proposal ? entryOf(proposal) : { from: column, ...(unit && channel.unit ? { unit } : {}) };
     this.chosen.set(channel.name, { column, entry });
+    this.release(channel, column);
+  }
+
+  /** A doubtful proposal of another quantity gives up the column that was chosen for `channel`. */
+  private release(channel: Channel, column: string): void {
+    for (const other of this.look?.channels ?? []) {
+      const isGuess = other.proposals.some((one) => one.doubt !== "" && keyOf(one) === column) && this.chosen.get(other.name)?.column === column;
+      if (!isGuess || other.title === channel.title) continue;
+      this.chosen.delete(other.name);
+      const box = this.rows.get(other.name);
+      if (box) this.fillRow(other, box);
+    }
   }
 
   private async save(output: string): Promise<void> {
@@ -363,33 +369,11 @@ function keyOf(proposal: Proposal): string {
   return proposal.columns.length === 1 && "from" in proposal.entry ? (proposal.columns[0] as string) : `from ${proposal.columns.join(", ")}`;
 }
 
-function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined, profile: string): string {
+function reason(choice: Choice | undefined, proposal: Proposal | undefined, column: Column | undefined, unit: string | null, profile: string): string {
   if (!choice) return "";
-  const fine = digits(column?.minimum) === digits(column?.maximum) ? 7 : 3; // a field's longitudes differ from the fifth digit on
-  const range = column && column.minimum !== null ? `${digits(column.minimum, fine)} to ${digits(column.maximum, fine)}, median ${digits(column.median, fine)}${column.unit ? ` ${column.unit}` : ""}` : (column?.examples ?? []).slice(0, 3).join(", ");
+  const range = rangeOf(column);
   if (profile) return `as saved in ${profile}${range && `; ${range}`}`;
-  if (!proposal) return `chosen by you; ${range}`;
+  if (!proposal) return chosenByHand(column, unit);
   const words = [...proposal.evidence, ...(proposal.doubt && !proposal.evidence.includes(proposal.doubt) ? [`? ${proposal.doubt}`] : []), ...(proposal.give ? [`? ${proposal.give}`] : [])];
   return `${Math.round(100 * proposal.confidence)} %: ${words.join("; ").replace(/\?$/, "")}. ${range}`;
-}
-
-/** How a column runs: the range of each stretch of the log, with zero as a line where it is crossed. */
-function plot(column: Column, turned: boolean): Element {
-  const outline = column.outline;
-  if (!outline) return h("span");
-  const known = outline.filter((one) => one !== null);
-  const low = Math.min(...known.map((one) => one[0]));
-  const high = Math.max(...known.map((one) => one[1]));
-  const span = high - low || 1;
-  const y = (value: number): number => (turned ? 2 + (28 * (value - low)) / span : 30 - (28 * (value - low)) / span);
-  const width = 120 / outline.length;
-  const path = outline
-    .map((one, i) => (one ? `M${((i + 0.5) * width).toFixed(1)} ${(y(one[0]) + 0.6).toFixed(1)}V${(y(one[1]) - 0.6).toFixed(1)}` : ""))
-    .join("");
-  return svg(
-    "svg",
-    { viewBox: "0 0 120 32", class: "outline", role: "img", "aria-label": `${column.name} over the log, ${digits(low)} to ${digits(high)}` },
-    low < 0 && high > 0 ? svg("line", { x1: 0, x2: 120, y1: y(0), y2: y(0), class: "zero" }) : null,
-    svg("path", { d: path, "stroke-width": Math.max(1.2, width) }),
-  );
 }
