@@ -63,6 +63,16 @@ def test_stops_zeros_for_what_was_not_there_and_fine_teeth_are_no_counted_pulses
         assert counted_warnings(Recording(time, {**one.recording.channels, **changed})) == []
 
 
+def test_the_last_digit_of_a_free_wheel_that_stands_while_others_spin_is_no_counted_pulse() -> None:
+    """A simulated machine that was stuck for six minutes: what is at speed, by the ground speed, is a coarse receiver's noise."""
+    rng, time = np.random.default_rng(0), np.arange(6000) * 0.01
+    free, driven = (0.135 * np.round(rng.normal(mean, 0.1, 6000) / 0.135) for mean in (0.0, 1.75))
+    ground = np.where(time < 2, 0.3, np.repeat(0.036 * np.round(rng.normal(0.0, 0.04, 600) / 0.036), 10))
+    log = Recording(time, {"ground_speed": ground, "wheel_speed_f": free, "wheel_speed_r": driven})
+    assert np.count_nonzero(free) < 0.9 * len(free)
+    assert counted_warnings(log) == []
+
+
 def test_a_derived_speed_is_as_uncertain_as_it_says() -> None:
     """The vehicle file states the sensor's noise; what a profile derives from it may err by more."""
     log = drive(30.0).recording

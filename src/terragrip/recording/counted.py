@@ -65,6 +65,8 @@ def _counted(recording: Recording) -> list[tuple[str, float, float]]:
         step, waits = quantum(what), np.diff(when[begins])
         if np.mean(np.abs(what[pulse]) > 2.5 * step) > _RARE:
             continue
+        if np.mean(np.diff(np.sign(what[begins])) != 0) > _RARE:  # noise of a wheel that stands
+            continue
         wait = median(waits)
         if np.mean(waits > _WAITS * wait) <= _RARE:
             result.append((name, step, max(_SHORTEST, ceil(10 * _PULSES * wait) / 10)))
