@@ -9,21 +9,11 @@ import { onceReleased } from "../ui/press";
 import { bind, boundTo } from "./bound";
 import { choice, reoffer, row } from "./fields";
 import { focusOn, refill } from "./focus";
+import { verdict, type Inspection } from "./inspection";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
 import { Mapping, type Look } from "./mapping";
 import type { Parts } from "./wheels";
-
-interface Inspection {
-  rows: number;
-  ready: boolean;
-  /** Why an estimate cannot run, though the log is whole; null where nothing is known against it. */
-  problem: string | null;
-  missing: string[];
-  warnings: string[];
-  recognised: Record<string, string[]>;
-  text: string;
-}
 
 interface Methods {
   default: string;
@@ -278,8 +268,9 @@ export class LogPage {
       this.hasLabels = "soil" in result.recognised;
       fill(
         found,
-        h("p", { class: ready ? "good" : "bad" }, this.verdict(result)),
+        h("p", { class: ready ? "good" : "bad" }, verdict(result, this.vehicle !== "", this.of("vehicle").length > 0)),
         ready ? null : this.namesMissing(),
+        this.offerRolling(result.rolling),
         result.warnings.filter((text) => !result.problem?.endsWith(text)).map((text) => h("p", { class: "hint" }, text)),
         h("details", {}, h("summary", {}, "Contents"), h("pre", { tabindex: "0" }, result.text)),
       );
@@ -301,10 +292,15 @@ export class LogPage {
     return h("p", {}, h("button", { type: "button", id: "name-wheels", click: go }, "Assign the wheels"));
   }
 
-  private verdict(found: Inspection): string {
-    const rows = `${found.rows.toLocaleString()} rows`;
-    if (found.ready) return this.vehicle ? `${rows}, ready to estimate.` : `${rows}; ${this.of("vehicle").length ? "choose the vehicle" : "a vehicle file is missing"}.`;
-    return found.problem ? `Not ready: ${found.problem}` : `Not ready: ${found.missing.join("; ") || "choose the columns"}.`;
+  /** What lets a machine be estimated whose free wheels have no sensor. */
+  private offerRolling(wheels: string[]): HTMLElement | null {
+    if (!wheels.length || this.mapping?.strangers.length) return null;
+    const roll = async (): Promise<void> => {
+      await this.mapping?.roll(this.vehicle);
+      await this.readBy(this.profile);
+    };
+    const button = h("button", { type: "button", id: "roll-free", click: () => void roll() }, "Let them roll with the ground");
+    return h("p", {}, button, ` ${wheels.join(", ")} ${wheels.length === 1 ? "is a free wheel" : "are free wheels"} without a speed in the log: the profile gives them the ground speed over their radius, so their slip is 0.`);
   }
 
   private async queue(kind: string, wanted: Record<string, unknown>, output: string): Promise<void> {
