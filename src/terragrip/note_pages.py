@@ -8,7 +8,7 @@ PAGES = (
     ("is a guess from the vehicle's size", "vehicle#noise-of-the-sensors"),
     ("where a machine of its mass and wheels has", "vehicle#all-keys"),
     ("is taken as measured at the antenna", "vehicle#where-the-ground-speed-is-measured"),
-    ("a vehicle's own lag is", "formats#two-sources-of-one-drive"),
+    ("the vehicle's own lag is", "formats#two-sources-of-one-drive"),
     ("or left and right wheels, may be exchanged", "checks#signs-exchanged-channels-copies"),
     ("the slower one pull", "checks#signs-exchanged-channels-copies"),
     ("of the axle's other wheel rises", "checks#signs-exchanged-channels-copies"),

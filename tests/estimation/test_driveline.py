@@ -201,3 +201,9 @@ def test_a_driveline_needs_wheels(tmp_path: Path) -> None:
     path.write_text("\n".join(line for line in STEADY.splitlines() if not line.startswith("wheel:")))
     with pytest.raises(InputError, match="radius"):
         tg.Vehicle.load(path)
+
+
+def test_a_receivers_delay_that_was_corrected_stays_in_the_intervals(tractor: tg.Vehicle) -> None:
+    """What a shift leaves unknown was searched for anew in the shifted log, which shows hardly any."""
+    log = replace(steady(), delay=0.06)
+    assert tg.estimate(log, tractor).about["settings"]["noise"]["ground_speed_delay"] == 0.06

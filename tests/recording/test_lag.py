@@ -120,3 +120,41 @@ def test_of_a_log_that_ends_at_speed_the_gains_alone_tell_a_late_clock(late: flo
     assert lag is not None
     assert lag.is_to_correct
     assert lag.seconds == pytest.approx(late, abs=0.1)
+
+
+def road_log(late: float) -> dict[str, np.ndarray]:
+    """A tractor with a trailer on a road, nine stops: it gains 6 g of speed per slip, and its receiver is ``late`` [s]."""
+    time = np.arange(0.0, 560.0, 0.1)
+    start, stop, level = np.random.default_rng(4).uniform([5, 4, 8], [9, 7, 13], (9, 3)).T
+    begin = 60.0 * np.arange(9) + 3
+    corners = np.stack([begin, begin + start, begin + 40, begin + 40 + stop], axis=1)
+    rim = np.interp(time, corners.ravel(), np.outer(level, [0, 1, 1, 0]).ravel())
+    speed = np.zeros(len(time))
+    for k in range(len(time) - 1):  # a = 6 g (rim - v) / rim, in steps that no speed makes too long
+        share = -np.expm1(-0.1 * 6 * 9.81 / max(rim[k + 1], 0.3))
+        speed[k + 1] = speed[k] + share * (rim[k + 1] - speed[k])
+    noise = np.random.default_rng(5).normal(0, 0.02, (2, len(time)))
+    return {
+        "time": time,
+        "ground_speed": np.interp(time - late, time, speed) + noise[0],
+        "wheel_speed_l": rim + noise[1],
+        "wheel_speed_r": rim + noise[1],
+    }
+
+
+def test_stops_on_a_road_show_how_late_a_receiver_is() -> None:
+    """The softest ground explains half a second at that speed, so no delay of a receiver was ever corrected."""
+    for late in (0.25, 0.4):
+        log = road_log(late)
+        lag = lag_within(log.pop("time"), log)
+        assert lag is not None
+        assert lag.is_to_correct
+        assert lag.of_the_clock == pytest.approx(late, abs=1.96 * lag.delay_left)
+
+
+def test_a_receiver_that_is_on_time_on_a_road_is_left() -> None:
+    log = road_log(0.0)
+    lag = lag_within(log.pop("time"), log)
+    assert lag is not None
+    assert not lag.is_of_the_clock
+    assert lag.delay < 0.08  # .11 where the softest ground is possible

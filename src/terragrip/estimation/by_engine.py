@@ -13,8 +13,9 @@ from terragrip.estimation.engine_torque import TAIL, DrivelineTorque
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
+from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.plain_units import size_warnings
-from terragrip.recording.survey import joined
+from terragrip.recording.survey import first_speeds, joined
 from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"
@@ -27,6 +28,8 @@ class ByEngine:
 
     def __init__(self, whole: Recording, original: Vehicle) -> None:
         reference = slip_reference_in(whole, original)
+        if whole.delay is None:
+            whole = replace(whole, delay=delay_of(lag_within(*first_speeds([whole]))))
         self._whole = whole
         self.machine = DrivenMachine.of_log(whole, original, reference)
         beside = tuple(note for note in reference.notes if note != WHAT_IS_MISSING)
@@ -66,7 +69,7 @@ class ByEngine:
     def _converted(self, log: Recording, before: int) -> tuple[Recording, DrivelineTorque]:
         """The rows of a log from ``before`` on as those of the machine of driven wheels, and the driveline's torque in them."""
         channels, drive = self.machine.converted(log.time, log.channels, before)
-        return replace(log.select(slice(before, None)), channels=channels, delay=None), drive
+        return replace(log.select(slice(before, None)), channels=channels, delay=self._whole.delay), drive
 
 
 def _tail(block: Recording) -> Recording:

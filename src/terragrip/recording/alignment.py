@@ -114,7 +114,7 @@ def _evidence(lag: Lag) -> str:
     side = "behind" if lag.seconds > 0 else "ahead of"
     return (
         f"{abs(lag.seconds):.3f} ± {lag.std:.3f} s {side} the wheel speeds, by the correlation of the speeds "
-        f"({lag.correlation:.3f}), where a vehicle's own lag is up to {lag.explained[1]:.2f} s on firm ground"
+        f"({lag.correlation:.3f}), where the vehicle's own lag is up to {lag.explained[1]:.2f} s"
     )
 
 

@@ -25,7 +25,7 @@ _LEAST_SHARE = 0.3  # of the shorter record
 _LEAST_CORRELATION = 0.8
 _LEAST_IN_PART = 0.6  # of gains or losses of speed alone
 _APART = 2.0  # s from the best offset, where another one must be worse
-_WORSE = 0.02  # in correlation
+_WORSE = 0.02  # in correlation, or twice as far from 1 as the best, a quarter of this at least: speeds on a road hardly change in seconds
 _WIDTH = 20  # points over which rates are smoothed: a second
 _ROUNDS = 5
 _LEAST_STD = 0.005  # s
@@ -37,6 +37,7 @@ _SURE = 4.0  # the same, for an automatic correction: runs without a late sensor
 _SHARP = 0.03  # s, a standard deviation up to which _CERTAIN is enough for it: on ground that gives way it is larger
 # K on soft soil: the slope of ASABE D497's gross traction ratio at 15 % slip, Bn = 20, is 1.85.
 STIFFNESS = 2.0
+_OWN_SURE = 3.0  # standard errors of what the log shows of a vehicle's own lag
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
 _USUAL = 0.1  # s, prior SD of a receiver's delay, before a log shows it (ours): receivers filter
 _FILTERED = 0.2  # of a lag that was corrected: a filter of first order errs by 1/e of its lag where a change begins, a mere delay does not
@@ -151,13 +152,34 @@ def lag_between(first: Speed, second: Speed, *, reach: float | None = None) -> L
         return None
     low = high = 0.0
     if first.pace is None and second.pace is not None:
-        high = second.pace / (STANDARD_GRAVITY * STIFFNESS)
+        high = _own(first, second, second.pace, result.seconds)
     elif second.pace is None and first.pace is not None:
-        low = -first.pace / (STANDARD_GRAVITY * STIFFNESS)
+        low = -_own(second, first, first.pace, -result.seconds)
     lag = replace(result, explained=(low, high))
     if not lag.is_of_the_clock:
         return lag
     return replace(lag, std=float(np.hypot(lag.std, _contradiction(first, second, lag.seconds))))
+
+
+def _own(wheels: Speed, ground: Speed, pace: float, seconds: float) -> float:
+    """The largest lag [s] of its own with which a vehicle follows its wheels at ``pace`` [m/s].
+
+    It is v / (g K) and grows with the speed v, where a clock's error does not: on a road, where the softest ground explains half a second,
+    stops show both. A tenth of a second remains possible, for tyres and filters lag at any speed. The rate of the ground speed is
+    regressed as in `_refined`, with a part of the lag that goes with the speed.
+    """
+    softest = pace / (STANDARD_GRAVITY * STIFFNESS)
+    mine, theirs = _regular(wheels.time, wheels.values), _regular(ground.time, ground.values)
+    if mine is None or theirs is None or softest <= _USUAL:
+        return softest
+    time, rate, jerk = _rates(mine)
+    speed = _at(time, theirs, seconds)
+    fit = _robust(np.stack([rate, jerk, jerk * _smooth(speed)], axis=1), np.gradient(_smooth(speed), _STEP))
+    if fit is None or fit[0][0] <= 0:
+        return softest
+    (scale, _, own), covariance = fit
+    most = pace * (_OWN_SURE * np.sqrt(covariance[2, 2]) - own) / scale
+    return float(np.clip(most, _USUAL, softest))
 
 
 def _contradiction(first: Speed, second: Speed, seconds: float) -> float:
@@ -240,7 +262,8 @@ def offset_between(
     if not correlation[best] >= _LEAST_CORRELATION:
         return None
     elsewhere = np.abs(shift - shift[best]) > _APART
-    if elsewhere.any() and correlation[elsewhere].max() > correlation[best] - _WORSE:
+    worse = np.clip(1.0 - correlation[best], _WORSE / 4, _WORSE)
+    if elsewhere.any() and correlation[elsewhere].max() > correlation[best] - worse:
         return None
     seconds, deviation = _refined(first, second, float(shift[best]))
     return Lag(seconds, deviation, float(min(correlation[best], 1.0)), (0.0, 0.0))
@@ -299,38 +322,55 @@ def _refined(
     missing part of the offset. Rates are used because a change of slip shifts a speed for long but a rate for a moment, and
     biweights exclude those moments.
     """
-    time = first[0] + _STEP * np.arange(len(first[1]))
-    mine = _smooth(first[1])
-    rate, jerk = np.gradient(mine, _STEP), np.gradient(_smooth(np.gradient(mine, _STEP)), _STEP)
+    time, rate, jerk = _rates(first)
+    design = np.stack([rate, jerk], axis=1)
     deviation = 0.5 * _APART  # without refinement only the correlation at _APART is known to be worse
     for _ in range(_ROUNDS):
-        stamps = second[0] - seconds + _STEP * np.arange(len(second[1]))
-        known = np.isfinite(second[1])
-        theirs = np.interp(time, stamps[known], second[1][known], left=np.nan, right=np.nan)
-        away = np.isnan(np.interp(time, stamps, second[1], left=np.nan, right=np.nan))
-        other = np.gradient(_smooth(np.where(away, np.nan, theirs)), _STEP)
-        both = np.isfinite(rate) & np.isfinite(jerk) & np.isfinite(other)
-        if both.sum() < 2 * _WIDTH:
+        fit = _robust(design, np.gradient(_smooth(_at(time, second, seconds)), _STEP))
+        if fit is None or fit[0][0] <= 0:
             break
-        design, target = np.stack([rate[both], jerk[both]], axis=1), other[both]
-        columns = np.ascontiguousarray(design.T)  # weighted three times as fast
-        weight = np.ones(len(target))
-        for _ in range(_ROUNDS):
-            normal = columns @ (weight * columns).T + 1e-12 * np.eye(2)
-            result = np.linalg.solve(normal, design.T @ (weight * target))
-            rest = target - design @ result
-            scale = max(1.4826 * median(np.abs(rest)), 1e-9)
-            weight = np.clip(1.0 - (rest / (4.7 * scale)) ** 2, 0.0, None) ** 2
-        if result[0] <= 0:
-            break
+        result, covariance = fit
         step = float(np.clip(-result[1] / result[0], -_APART, _APART))
         seconds += step
-        # Points within the smoothing are alike: so many count as one.
-        spread = scale**2 * 2 * _WIDTH * np.linalg.inv(normal)[1, 1]
-        deviation = max(float(np.sqrt(spread) / result[0]), _LEAST_STD)
+        deviation = max(float(np.sqrt(covariance[1, 1]) / result[0]), _LEAST_STD)
         if abs(step) < 0.1 * deviation:
             break
     return seconds, deviation
+
+
+def _rates(speed: tuple[float, Floats]) -> tuple[Floats, Floats, Floats]:
+    """The points (n,) of a regular speed, its rate and its jerk there."""
+    rate: Floats = np.gradient(_smooth(speed[1]), _STEP)
+    jerk: Floats = np.gradient(_smooth(rate), _STEP)
+    return np.asarray(speed[0] + _STEP * np.arange(len(rate)), np.float64), rate, jerk
+
+
+def _at(time: Floats, speed: tuple[float, Floats], seconds: float) -> Floats:
+    """A regular speed whose clock is ``seconds`` ahead, at ``time`` (n,), NaN outside and in its gaps."""
+    stamps, known = speed[0] - seconds + _STEP * np.arange(len(speed[1])), np.isfinite(speed[1])
+    values = np.interp(time, stamps[known], speed[1][known], left=np.nan, right=np.nan)
+    away = np.isnan(np.interp(time, stamps, speed[1], left=np.nan, right=np.nan))
+    return np.where(away, np.nan, values)
+
+
+def _robust(design: Floats, target: Floats) -> tuple[Floats, Floats] | None:
+    """Coefficients (k,) of a regression on ``design`` (n, k) by biweights, and their covariance (k, k); None of too few rows."""
+    rows = np.isfinite(design).all(axis=1) & np.isfinite(target)
+    if rows.sum() < 2 * _WIDTH:
+        return None
+    design, target = design[rows], target[rows]
+    columns = np.ascontiguousarray(design.T)  # weighted three times as fast
+    weight = np.ones(len(target))
+    for _ in range(_ROUNDS):
+        normal = columns @ (weight * columns).T + 1e-12 * np.eye(len(columns))
+        result = np.linalg.solve(normal, design.T @ (weight * target))
+        rest = target - design @ result
+        scale = max(1.4826 * median(np.abs(rest)), 1e-9)
+        weight = np.clip(1.0 - (rest / (4.7 * scale)) ** 2, 0.0, None) ** 2
+    # Points within the smoothing are alike: so many count as one.
+    return np.asarray(result, np.float64), np.asarray(
+        scale**2 * 2 * _WIDTH * np.linalg.inv(normal), np.float64
+    )
 
 
 def _smooth(values: Floats) -> Floats:
