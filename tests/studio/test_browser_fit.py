@@ -195,3 +195,26 @@ def test_a_curve_set_by_hand_outlasts_a_reload_and_who_comes_back_finds_it_once(
     page.wait_for_selector(".note:has-text('soils.json was replaced: reloaded')")
     page.wait_for_function(f"n => ({bins})()[0] === n", arg=before[0] - 1)
     assert page.input_value("#field-a") == "0.7"
+
+
+def test_a_librarys_curve_comes_with_what_its_fit_left_open_and_keeps_it_when_saved(
+    page: Any, served: Served, folder: Path
+) -> None:
+    """A curve of which soils.json said 'a .001 to 1.7, not fixed' was drawn as sure, and lost its interval in the next library."""
+    library = json.loads((folder / "soils.json").read_text())
+    ((name, soil),) = library["soils"].items()
+    soil["interval"] = {"a": [0.001, 1.7]}
+    soil["identifiability"] |= {"identifiable": False, "sentence": "The data leave a open."}
+    soil["notes"] = ["The data leave a open."]
+    (folder / "soils.json").write_text(json.dumps(library))
+    page.goto(f"{served.url}/#/fit?path=soils.json")
+    page.wait_for_selector(".result .badge:has-text('not identifiable')")
+    assert "0.001 … 1.7" in page.inner_text(".result")
+    assert "The data leave a open." in page.inner_text(".result")
+    page.wait_for_function("() => document.querySelector('main').textContent.includes('beyond the points')")
+    page.once("dialog", lambda dialog: dialog.accept("other.json"))
+    page.click("text=Save to library")
+    page.wait_for_selector(".note:has-text('saved to other.json')")
+    saved = json.loads((folder / "other.json").read_text())["soils"][name]
+    for key in ("parameters", "interval", "identifiability", "notes"):
+        assert saved[key] == soil[key]

@@ -4,7 +4,7 @@ import { get, type Item } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { onceReleased } from "../ui/press";
-import type { Curve, Soil, State } from "./state";
+import type { Curve, FitResult, Soil, State } from "./state";
 
 interface Literature {
   name: string;
@@ -13,11 +13,16 @@ interface Literature {
   source: string;
 }
 
-interface Served extends Partial<Soil> {
+/** A soil of estimates or of digitised points, or of a library with what its fit gave. */
+interface Served extends Partial<Soil>, Partial<Omit<FitResult, "bins">> {
   name: string;
-  model?: string;
-  parameters?: Record<string, number>;
   source?: string;
+}
+
+/** The fit that a library keeps of a soil: without it a curve that the data leave open would be shown as if it were known. */
+function fitOf({ model, parameters, free, interval, identifiability, r2, nrmse, bins = [], clusters = 0, common_slip_sd, notes = [], band }: Served): FitResult | null {
+  if (!model || !parameters || !free || !interval || !identifiability) return null;
+  return { model, parameters: { ...parameters }, free, interval, identifiability, r2: r2 ?? NaN, nrmse: nrmse ?? NaN, bins, clusters, common_slip_sd, notes, at_bound: [], band };
 }
 
 export class ListPanel {
@@ -195,7 +200,11 @@ export class ListPanel {
     for (const one of served ?? []) {
       const key = `${path}#${one.name}`;
       this.state.soils = this.state.soils.filter((soil) => soil.key !== key);
-      if (one.model && one.parameters) curves.push(Object.assign(this.state.addCurve(one.model, one.parameters, one.name, one.source || path), { data: key }));
+      if (one.model && one.parameters) {
+        const curve = Object.assign(this.state.addCurve(one.model, one.parameters, one.name, one.source || path), { data: key, fit: fitOf(one) });
+        if (curve.fit) curve.held = Object.keys(curve.parameters).filter((name) => name !== "intercept" && !curve.fit?.free.includes(name));
+        curves.push(curve);
+      }
       if (!one.bins?.length && !one.points?.slip.length) {
         if (one.note) note(`${path}: ${one.note}`, "error");
         continue;

@@ -138,7 +138,7 @@ async function keep(state: State): Promise<void> {
     model: curve.model,
     parameters: curve.parameters,
     source: curve.source,
-    ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins, clusters: fitted.clusters || null, common_slip_sd: fitted.common_slip_sd ?? null } : {}),
+    ...(fitted ? { free: fitted.free, interval: fitted.interval, band: fitted.band, r2: fitted.r2, nrmse: fitted.nrmse, bins: fitted.bins, clusters: fitted.clusters || null, common_slip_sd: fitted.common_slip_sd ?? null, identifiability: fitted.identifiability, notes: fitted.notes } : {}),
   };
   const store = async (): Promise<boolean> => {
     try {

@@ -111,7 +111,9 @@ export class Plot {
     if (!curve?.shown || !samples) return "";
     const unit = unitFor("share");
     const [slip, value] = samples.peak;
-    const shape = `initial slope ${digits(samples.initial_slope)}, ${slip < 0.999 ? `largest µ ${digits(value + (curve.parameters["intercept"] ?? 0))} at ${withUnit(digits(unit.scale * slip), unit)} slip` : "µ rises with slip"}`;
+    const end = Math.max(...(target?.bins ?? []).map((bin) => bin.slip));
+    const beyond = slip > end && end > 0 ? `, beyond the points (to ${withUnit(digits(unit.scale * end), unit)})` : "";
+    const shape = `initial slope ${digits(samples.initial_slope)}, ${slip < 0.999 ? `largest µ ${digits(value + (curve.parameters["intercept"] ?? 0))} at ${withUnit(digits(unit.scale * slip), unit)} slip${beyond}` : "µ rises with slip"}`;
     if (!target?.bins.length) return shape;
     const { r2, rms, count } = quality(target.bins, samples);
     const fitted = curve.fit && !sameCurve(curve) ? ` (fit ${digits(curve.fit.r2)})` : "";

@@ -29,13 +29,12 @@ export interface FitResult {
   nrmse: number;
   bins: Bin[];
   clusters: number;
-  common_slip_sd?: number;
+  common_slip_sd?: number | undefined;
   identifiability: { condition: number; identifiable: boolean; effective: Parameters; twin: Parameters | null; sentence: string };
   notes: string[];
   /** Free parameters that stopped at an end of their range: the data do not fix them. */
   at_bound: string[];
-  band?: { slip: number[]; low: number[]; high: number[] };
-  peak: [number, number];
+  band?: undefined | { slip: number[]; low: number[]; high: number[] };
   /** Of a fit that began at the curve as it was set by hand: R² of the automatic fit before, null where there was none. */
   automatic?: number | null;
 }

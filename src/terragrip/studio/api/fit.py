@@ -79,6 +79,8 @@ class SaveRequest(BaseModel):
     common_slip_sd: FiniteFloat | None = Field(
         None, ge=0, description="SD of the error of slip that the bins share."
     )
+    identifiability: dict[str, Any] | None = Field(None, description="As `/fit` gives it.")
+    notes: list[str] = []
     source: str = "studio"
     replace: bool = False
 
