@@ -277,6 +277,23 @@ def test_a_tractor_without_sensors_at_its_free_wheels_is_estimated_without_a_tex
     assert page.query_selector("#roll-free") is None
 
 
+def test_a_log_is_tried_again_when_the_studio_is_back(
+    page: Any, served: Served, folder: Path, made: Path
+) -> None:
+    """The page went on to say that the studio does not respond, with no way to estimate but a reload."""
+    for name in ("recording.parquet", "vehicle.yaml"):
+        (folder / name).write_bytes((made / name).read_bytes())
+    page.goto(f"{served.url}/#/start?log=recording.parquet")
+    page.wait_for_selector("#wizard-go:enabled")
+    served.stop()
+    page.click("text=Method and file")
+    page.select_option("#wizard-method", "kalman")
+    page.wait_for_selector("#wizard-found:has-text('does not respond')")
+    served.start()
+    page.wait_for_selector("#wizard-found:has-text('ready to estimate')")
+    assert page.is_enabled("#wizard-go")
+
+
 def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
     page: Any, served: Served, folder: Path, foreign: Path, made: Path
 ) -> None:

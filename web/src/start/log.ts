@@ -1,7 +1,7 @@
 /** From a stranger's log to estimates, a curve and a report: columns, machine, estimate, and what follows from it. */
 
 import type { Run } from "../drive/run";
-import { get, send, type Item, type Job } from "../ui/api";
+import { get, send, SILENT, type Item, type Job } from "../ui/api";
 import { fill, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { oneAtATime, type Context } from "../ui/page";
@@ -277,7 +277,10 @@ export class LogPage {
       go.disabled = !ready;
       this.drawNext();
     } catch (error) {
-      if (turn === this.looks) fill(found, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
+      if (turn !== this.looks) return;
+      const text = error instanceof Error ? error.message : String(error);
+      if (text === SILENT) this.read[1] = ""; // asked again as soon as the studio responds
+      fill(found, h("p", { class: "bad", role: "alert" }, text));
     }
   }
 
