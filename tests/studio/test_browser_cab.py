@@ -92,6 +92,24 @@ def test_a_threshold_rings_and_is_kept(page: Any, served: Served, service: LiveS
     assert page.input_value("#alarm-slip") == "25"
 
 
+def test_a_pause_holds_the_numbers_and_not_the_alarms(
+    page: Any, served: Served, service: LiveService
+) -> None:
+    """Who paused to read a value was no longer warned: not of slip, nor that the source had gone."""
+    page.goto(f"{served.url}/#/live")
+    page.wait_for_function("() => window.terragripLive?.feed.ring.taken > 10")
+    page.click("button:text-is('Pause')")
+    page.click("summary:text-is('Alarms')")
+    page.fill("#alarm-slip", "15")
+    page.press("#alarm-slip", "Tab")
+    page.wait_for_selector(".alarm:text-is('Slip 20 % is over 15 %')")
+    assert page.inner_text("#live-state") == "paused"
+    service.mode = "silent"
+    page.wait_for_selector(".alarm:has-text('in the last measurement')")
+    rings = "() => window.terragripLive.alarms.rings"
+    page.wait_for_function(f"n => ({rings})() > n", arg=page.evaluate(rings))
+
+
 def test_looking_back_leaves_the_numbers_and_the_recording(
     page: Any, served: Served, service: LiveService
 ) -> None:

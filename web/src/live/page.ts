@@ -144,10 +144,8 @@ export const page: Page = (main, { notices, query }) => {
   }
   feed.onRows = () => {
     updates++;
-    if (traces.held === null) {
-      traces.redraw();
-      numbers();
-    }
+    if (traces.held === null) traces.redraw();
+    numbers();
     if (main.classList.contains("stale") || main.classList.contains("predicted") || feed.ring.isPredicted || feed.messages === 1) freshness();
   };
   feed.onSaid = tell;
@@ -185,9 +183,11 @@ export const page: Page = (main, { notices, query }) => {
     if (event in WARNING) warnedAt = ring.now;
     else if (!warning.hidden && !(ring.now - warnedAt < LINGER)) warning.hidden = true;
     const now = reading(ring, hello, peak);
-    slip.set(...now.slip.shown);
-    grip.set(...now.grip.shown);
-    speedTile.set(...now.speed.shown);
+    if (traces.held === null) {
+      slip.set(...now.slip.shown);
+      grip.set(...now.grip.shown);
+      speedTile.set(...now.speed.shown);
+    }
     if (!ring.isPredicted) alarms.check(now, event);
   }
 
@@ -234,7 +234,8 @@ export const page: Page = (main, { notices, query }) => {
   }, 1000);
   const watch = window.setInterval(() => {
     freshness();
-    alarms.silent(feed.ring.taken > 0 && main.classList.contains("stale") && traces.held === null && feed.state !== "ended");
+    const { isOld } = ageOf(feed, delay, Number(speed.value), false); // an alarm is no part of what was paused
+    alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }, 1000 * CHECK);
   const forgets = [
     notices.on((notice) => notice.kind === "folder" && void reload(false)),
