@@ -170,9 +170,10 @@ X = np.sin(np.arange(80) / 3.0) + 0.3 * np.sin(np.arange(80))
 
 
 def torques(turned: tuple[str, ...] = (), **more: np.ndarray) -> Recording:
-    """Wheels that drive on average, but those of a wrong sign."""
-    mean = {f"drive_torque_{w}": np.full(80, -10.0 if w in turned else 10.0) for w in WHEELS}
-    return Recording(np.arange(80.0), mean | more)
+    """Wheels that drive on average and push by X in all, but those of a wrong sign."""
+    torque = 10.0 + X / 4 * RADIUS * MASS
+    mine = {f"drive_torque_{w}": -torque if w in turned else torque for w in WHEELS}
+    return Recording(np.arange(80.0), mine | more)
 
 
 @pytest.mark.parametrize(
@@ -224,6 +225,17 @@ def test_wheels_that_drive_against_the_others_are_named(
     thrusts = {w: (-1 if w in turned else 1) * X / 4 for w in WHEELS}
     notes = " ".join(_balance_warnings(torques(turned), replace(means, thrusts=thrusts), X, vehicle))
     assert notes == "" if not words else words in notes
+
+
+def test_wheels_without_a_drive_beside_a_trailer_have_no_wrong_sign(vehicle: Vehicle) -> None:
+    """Four-wheel drive is off: their sensors' zeros, less their share of what a trailer pulls, fall as the others' thrust rises."""
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    free = {f"drive_torque_{w}": np.full(80, -0.1) - 0.01 * X for w in WHEELS[:2]}
+    pull, rough = 2 * X, 1.5 * np.cos(np.arange(80) * 2.1)
+    thrusts = dict.fromkeys(WHEELS[:2], -pull / 4) | dict.fromkeys(
+        WHEELS[2:], (X + pull + rough) / 2 - pull / 4
+    )
+    assert _balance_warnings(torques(**free), replace(means, thrusts=thrusts), X, vehicle) == []
 
 
 def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:

@@ -229,7 +229,7 @@ def _balance_warnings(
     thrust = means.thrust
     driven = means.fit(thrust, means.change, beside_climb=True)
     together = means.fit(thrust, forward)
-    exchanged = _exchanged(recording, means, forward, together)
+    exchanged = _exchanged(recording, vehicle, means, forward, together)
     if exchanged:
         return [exchanged]
     if not together.is_another_scale:  # a hill or a pull that nobody knows hides the proportion, not the sign
@@ -259,23 +259,23 @@ def _opposite(found: str) -> WrongSign:
     return WrongSign(f"{found}{_SIGN.format('it')}.", ["acceleration_x"], shown)
 
 
-def _exchanged(recording: Recording, means: Means, forward: Floats, together: Fit) -> str:
+def _exchanged(recording: Recording, vehicle: Vehicle, means: Means, forward: Floats, together: Fit) -> str:
     """Whether the balance closes with the other sign of some wheels' torques, or the accelerometer's other axis."""
     # A wheel of a wrong sign also brakes on average; in changes alone, the sharing of a pull among axles looks like a sign.
-    thrusts = means.thrusts
-    backward = {w for w in thrusts if np.nanmean(means.of(recording.channels[f"drive_torque_{w}"])) < 0}
-    signs = {
-        w: -1 if w in backward and means.fit(own, forward).slope < 0 else 1 for w, own in thrusts.items()
+    own = {
+        w: means.of(recording.channels[f"drive_torque_{w}"]) / radius / vehicle.mass
+        for w, radius in vehicle.driven_radii.items()
     }
+    backward = [w for w, push in own.items() if np.nanmean(push) < 0 and means.fit(push, forward).slope < 0]
     plain = abs(together.alike)
-    turned = abs(means.fit(np.sum([signs[w] * own for w, own in thrusts.items()], axis=0), forward).alike)
+    turned = abs(means.fit(means.thrust - 2 * sum(own[w] for w in backward), forward).alike)
     sideways = recording.channels.get("acceleration_y")
     other = 0.0 if sideways is None else abs(means.fit(means.thrust, means.of(sideways)).alike)
     if plain > _ALIKE or max(turned, other) < _CLEAR:
         return ""
     if other > turned:
         return "acceleration_y varies with the drive torques and acceleration_x does not: the two axes may be exchanged."
-    odd = [f"drive_torque_{wheel}" for wheel, sign in signs.items() if sign < 0]
+    odd = [f"drive_torque_{wheel}" for wheel in backward]
     shown = "the other wheels' torques vary with acceleration_x, and these against it"
     return WrongSign(f"{', '.join(odd)}: {shown}; {_SIGN.format('each')}.", odd, shown)
 
