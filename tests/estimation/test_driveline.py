@@ -13,6 +13,7 @@ import terragrip as tg
 from stock_tractor import StockMachine, stock_machine
 from terragrip.errors import InputError
 from terragrip.estimation.batch import RunOptions, estimated
+from terragrip.ground.events import events
 from terragrip.recording import LogBlocks, Recording
 from terragrip.simulation.families import Kind, draw
 
@@ -166,7 +167,7 @@ def test_what_a_pto_takes_does_not_pull(tractor: tg.Vehicle) -> None:
     assert any("The PTO turns in 50% of the log" in note for note in unknown.notes)
     unseen = replace(baling, channels={n: v for n, v in baling.channels.items() if n != "pto_speed"})
     (leap,) = [note for note in tg.estimate(unseen, tractor).notes if " leaps " in note]
-    assert "a PTO or a pump took another part" in leap
+    assert "a PTO, a pump or a brake took another part" in leap
     mowing = baling.with_channels(pto_speed=0 * log.time, pto_speed_front=baling["pto_speed"])
     np.testing.assert_array_equal(tg.estimate(mowing, tractor)["adhesion_driven"], unknown["adhesion_driven"])
     data = tractor.to_dict()
@@ -207,3 +208,14 @@ def test_a_receivers_delay_that_was_corrected_stays_in_the_intervals(tractor: tg
     """What a shift leaves unknown was searched for anew in the shifted log, which shows hardly any."""
     log = replace(steady(), delay=0.06)
     assert tg.estimate(log, tractor).about["settings"]["noise"]["ground_speed_delay"] == 0.06
+
+
+def test_without_a_torque_nothing_shows_that_the_wheels_pull_against_a_push(tractor: tg.Vehicle) -> None:
+    """A trailer runs up from 40 s on, while a PTO takes an unknown part: the event said 'The wheels pull (adhesion nan ...'."""
+    log = steady()
+    late = log.time > 40.0
+    pushed = log.with_channels(drawbar_force=np.where(late, -5e3, log["drawbar_force"]))
+    assert "push" in tg.estimate(pushed, tractor)["event"][late]
+    unknown = tg.estimate(pushed.with_channels(pto_speed=np.where(late, 56.5, 0.0)), tractor)
+    assert "push" not in unknown["event"]
+    assert not any("nan" in event.why for event in events(unknown))

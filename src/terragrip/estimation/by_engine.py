@@ -20,7 +20,7 @@ from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"
 _ITS_ZERO = "its zero moved, or the signal was lost."
-_TAKEN = "a PTO or a pump took another part of the engine's, or the signal was lost."
+_TAKEN = "a PTO, a pump or a brake took another part of the engine's, or the signal was lost."
 
 
 class ByEngine:
@@ -54,7 +54,9 @@ class ByEngine:
     def completed(self, parts: Iterator[Estimates]) -> Iterator[Estimates]:
         """Estimates of that machine, widened by the uncertainty of the driveline's losses; NaN where no torque is known."""
         for part in parts:
-            columns = {**part.columns, **self.machine.completed(part.columns, self._waiting.popleft().std)}
+            std = self._waiting.popleft().std
+            columns = {**part.columns, **self.machine.completed(part.columns, std)}
+            none = ~np.isfinite(std) & part.during("push")  # no torque shows that the wheels pull
             columns = {name: values for name, values in columns.items() if self.machine.shows(name)}
             about = {**part.about, "driveline": self.machine.to_dict()}
             notes = (
@@ -63,7 +65,11 @@ class ByEngine:
                 if not (self.machine.unknown_pto and note.startswith(_LEAPS))
             )
             yield replace(
-                part, columns=columns, about=about, notes=tuple(dict.fromkeys((*notes, *self.notes)))
+                part,
+                columns=columns,
+                event_codes=np.where(none, np.uint8(0), part.event_codes),
+                about=about,
+                notes=tuple(dict.fromkeys((*notes, *self.notes))),
             )
 
     def _converted(self, log: Recording, before: int) -> tuple[Recording, DrivelineTorque]:

@@ -118,7 +118,8 @@ class EngineEstimator(TractionEstimator):
         columns = {name: np.array([values[places[name]]]) for name in names}
         for name, value in self.machine.completed(columns, std).items():
             values[places[name]] = float(value[0])
-        return Estimate(estimate.time, estimate.event, values, self._places)
+        none = estimate.event == "push" and not np.isfinite(std[0])  # no torque shows that the wheels pull
+        return Estimate(estimate.time, "" if none else estimate.event, values, self._places)
 
     def update_block(self, recording: Recording) -> Estimates:
         """Not available sample by sample: it needs a whole log, see :func:`terragrip.estimate`."""

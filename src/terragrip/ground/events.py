@@ -100,8 +100,9 @@ def _stuck(estimates: Estimates, rows: Ints) -> str:
         turning = float(np.nanmedian(np.abs(_mean(estimates, "wheel_speed", rows))))
         turn = f"turn at {turning:.2f} rad/s"
     by_torque = ""
-    if estimates.has_adhesion:
-        adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
+    adhesions = _mean(estimates, "adhesion", rows) if estimates.has_adhesion else np.full(1, np.nan)
+    if np.isfinite(adhesions).any():  # an engine's torque is not known in every row
+        adhesion = float(np.nanmedian(adhesions))
         by_torque = f", with adhesion at {adhesion:.2f} from the drive torques"
     return (
         f"The wheels {turn} and the vehicle moves at {speed:.2f} m/s{by_torque}: "
