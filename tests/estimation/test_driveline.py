@@ -219,3 +219,20 @@ def test_without_a_torque_nothing_shows_that_the_wheels_pull_against_a_push(trac
     unknown = tg.estimate(pushed.with_channels(pto_speed=np.where(late, 56.5, 0.0)), tractor)
     assert "push" not in unknown["event"]
     assert not any("nan" in event.why for event in events(unknown))
+
+
+def test_an_engine_that_droops_is_no_mistake_of_mass_or_torques(tractor: tg.Vehicle) -> None:
+    """A pull that comes and goes slows the engine in one gear, so thrust falls as the rims gain: 'change by -1.2 times the force ...'."""
+    log, noise = steady(120.0), np.random.default_rng(1).standard_normal((2, 1200))
+    pull = 20e3 + 8e3 * np.sin(log.time / 1.7) + 4e3 * np.sin(log.time)
+    speed = 2.2 - np.interp(log.time - 0.8, log.time, pull) / 1e5
+    engine, force = speed / 0.8 * 80, pull + 6000 * np.gradient(speed, 0.1) + 5e3
+    log = log.with_channels(
+        ground_speed=speed + 0.002 * noise[0],
+        wheel_based_speed=speed + 0.001 * noise[1],
+        engine_speed=engine,
+        engine_torque=force * 0.8 / 80 / 0.85 + 8e3 / engine,
+    )
+    unlogged = replace(log, channels={n: v for n, v in log.channels.items() if n != "drawbar_force"})
+    notes = tg.estimate(unlogged, tractor).notes
+    assert not any("In starts and stops" in note for note in notes)

@@ -62,11 +62,24 @@ def test_a_share_is_of_the_reference_less_friction() -> None:
 
 
 def test_an_engine_that_gains_speed_keeps_torque_for_itself() -> None:
-    """A ramp of 10 rad/s² at 1.5 kg m² takes 15 N m; what the ramp is, is seen half a second back."""
+    """A ramp of 10 rad/s² at 1.5 kg m² takes 15 N m, by the change from row to row."""
     driveline = Driveline(efficiency=0.8, accessory_power=0.0, engine_inertia=1.5, ratio=20.0)
     time = np.arange(0.0, 5.0, 0.25)
     speed = 150.0 + 10.0 * np.clip(time - 1.0, 0.0, 2.0)
     channels = {"engine_speed": speed, "engine_torque": np.full(len(time), 210.0)}
     got = driveline_torque(driveline, EngineTorque(None, 5.0), time, channels, speed / 20.0, 0.8)
-    gained = np.interp(time, [1.0, 1.5, 3.0, 3.5], [0.0, 10.0, 10.0, 0.0])
+    gained = np.interp(time, [1.0, 1.25, 3.0, 3.25], [0.0, 10.0, 10.0, 0.0])
     np.testing.assert_allclose(got.torque, 0.8 * 20.0 * (210.0 - 1.5 * gained), rtol=1e-9)
+
+
+def test_what_turns_the_engine_faster_does_not_reach_the_wheels() -> None:
+    """A speed that swings by 10 rad/s within 3 s takes 500 N m at the wheels; of its change over half a second 260 were left."""
+    driveline = Driveline.model_validate(
+        {"efficiency": 0.8, "accessory_power": 0.0, "ratio": 20.0, "engine_inertia": 1.5}
+    )
+    time = 0.1 * np.arange(300)
+    phase = 2 * np.pi * time / 3
+    speed, change = 180 + 10 * np.sin(phase), 2 * np.pi / 3 * 10 * np.cos(phase)
+    channels = {"engine_speed": speed, "engine_torque": 100 + 1.5 * change}
+    got = driveline_torque(driveline, EngineTorque(None, 5.0), time, channels, speed / 20, 0.8)
+    assert np.abs(got.torque[10:] - 1600).max() < 60

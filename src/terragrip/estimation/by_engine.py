@@ -20,6 +20,8 @@ from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"
 _ITS_ZERO = "its zero moved, or the signal was lost."
+_STARTS = "In starts and stops the drive torques"
+"""What these say of the mass is not so: where the ratio changes rows have no torque, and in the rest the engine's inertia counts more."""
 _TAKEN = "a PTO, a pump or a brake took another part of the engine's, or the signal was lost."
 
 
@@ -62,7 +64,7 @@ class ByEngine:
             notes = (
                 note.replace(_ITS_ZERO, _TAKEN) if note.startswith(_LEAPS) else note
                 for note in part.notes
-                if not (self.machine.unknown_pto and note.startswith(_LEAPS))
+                if not (note.startswith(_STARTS) or (self.machine.unknown_pto and note.startswith(_LEAPS)))
             )
             yield replace(
                 part,

@@ -16,6 +16,7 @@ from terragrip.vehicle_parts import Driveline
 
 _HOLD = 2.0  # s that a value is used for
 _LAGS = (0.5, 1.0)  # s: over them the ratio is compared
+_CHANGE = 0.1  # s, over which the engine's acceleration is taken: in a low gear its inertia is several times the machine's mass
 _REACH = 3.0  # s: no older value is compared with
 TAIL = 2 * _HOLD + _REACH
 """s of the rows before that a row's torque depends on."""
@@ -125,8 +126,8 @@ def driveline_torque(
             before = earlier(time, ratio, lag)
             shift |= np.isfinite(before) & ~(np.abs(ratio / before - 1) <= _SHIFT)
         shift &= known
-    acceleration = (speed - earlier(time, speed, _LAGS[0])) / (
-        time - earlier(time, np.where(np.isfinite(speed), time, np.nan), _LAGS[0])
+    acceleration = (speed - earlier(time, speed, _CHANGE)) / (
+        time - earlier(time, np.where(np.isfinite(speed), time, np.nan), _CHANGE)
     )
     power, power_std = _taken(driveline, pto_turns(time, channels))
     into = torque_into_gears(
