@@ -229,6 +229,11 @@ class Vehicle(Part):
         """Whether each wheel is driven (n,)."""
         return _frozen(np.array([axle.driven for axle in self.axles.values() for _ in axle.wheels]))
 
+    @property
+    def free_wheels(self) -> tuple[str, ...]:
+        """The wheels that are not driven: their slip says nothing of the drive."""
+        return tuple(wheel for wheel, on in zip(self.wheels, self.driven, strict=True) if not on)
+
     @cached_property
     def axle_mass(self) -> Floats:
         """Mass that each axle carries at rest on level ground (axles,) [kg]."""

@@ -22,6 +22,7 @@ from machine import events, messages, rows_of, running, until
 from terragrip.errors import InputError
 from terragrip.formats import Profile
 from terragrip.live.links.foxglove import NAMES
+from terragrip.live.links.studio import Broadcast
 from terragrip.live.options import Options
 from terragrip.live.service import Service
 from terragrip.live.thread_bridge import repeated_in_thread
@@ -269,6 +270,14 @@ def readable_messages(path) -> int:
 async def test_foxglove_stays_on_this_machine(vehicle):
     with pytest.raises(InputError, match="SSH tunnel"):
         Service(vehicle, ["udp://127.0.0.1:9870"], ["foxglove://0.0.0.0:8765"])
+
+
+async def test_a_client_of_the_studios_websocket_gets_the_driven_wheels():
+    """Where a driven wheel's speed was lost the cab showed the free wheel's slip: 0 %."""
+    frames = Broadcast(lambda: {"": ("tractor", ["slip_fl", "slip_rl"], ("fl",))}).subscribe()
+    hello = json.loads(await anext(frames))
+    await frames.aclose()
+    assert (hello["wheels"], hello["driven"]) == (["fl", "rl"], ["rl"])
 
 
 async def test_the_studios_websocket_in_json_and_in_doubles(tmp_path, vehicle, port):

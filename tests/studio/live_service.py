@@ -44,7 +44,14 @@ class LiveService:
             await self._send(socket)
 
     async def _send(self, socket: Any) -> None:
-        hello = {"kind": "hello", "vehicle": "v", "columns": COLUMNS, "wheels": ["a"], "events": [""]}
+        hello = {
+            "kind": "hello",
+            "vehicle": "v",
+            "columns": COLUMNS,
+            "wheels": ["a"],
+            "driven": ["a"],
+            "events": [""],
+        }
         values = dict(zip(COLUMNS, VALUES, strict=True))
         if self.vehicles:
             (name,) = parse_qs(urlsplit(socket.request.path).query).get("vehicle", self.vehicles[:1])

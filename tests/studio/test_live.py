@@ -69,7 +69,14 @@ def service() -> Iterator[str]:
     async def answer(socket: ServerConnection) -> None:
         await socket.send(
             json.dumps(
-                {"kind": "hello", "vehicle": "v", "columns": ["slip_a"], "wheels": ["a"], "events": [""]}
+                {
+                    "kind": "hello",
+                    "vehicle": "v",
+                    "columns": ["slip_a"],
+                    "wheels": ["a"],
+                    "driven": ["a"],
+                    "events": [""],
+                }
             )
         )
         for i in range(200):

@@ -41,10 +41,13 @@ PATTERNS = (
 async def replayed(table: Estimates, speed: float, start: float) -> AsyncIterator[str | bytes]:
     """Play a table from `start` [s] at `speed` times its own pace; ends with the table."""
     names = [n for n in table.columns if _wanted(n)]
-    yield json.dumps(
-        {"kind": "hello", "version": __version__, "vehicle": table.vehicle.name, "columns": names, "wheels": list(table.wheels),
-         "events": list(EVENTS), "replay": {"start": float(table.time[0]), "end": float(table.time[-1])}}
-    )  # fmt: skip
+    free = table.vehicle.free_wheels
+    hello = {
+        "kind": "hello", "version": __version__, "vehicle": table.vehicle.name, "columns": names, "wheels": list(table.wheels),
+        "driven": [wheel for wheel in table.wheels if wheel not in free], "events": list(EVENTS),
+        "replay": {"start": float(table.time[0]), "end": float(table.time[-1])},
+    }  # fmt: skip
+    yield json.dumps(hello)
     messages = [
         {"kind": e.kind, "source": "estimator", "time": e.start, "text": e.why} for e in events(table)
     ]

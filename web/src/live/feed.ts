@@ -7,6 +7,8 @@ export interface Hello {
   vehicle: string;
   columns: string[];
   wheels: string[];
+  /** Of a service before 29 November 2026 not known. */
+  driven?: string[];
   events: string[];
   replay?: { start: number; end: number };
   /** Of a service of many: which this is, and all that send. */

@@ -21,7 +21,7 @@ export interface Figure {
   shown: [string, string];
 }
 
-/** Slip of the wheel that slips most, share of the soil's offer in use, ground speed [m/s]. */
+/** Slip of the driven wheel that slips most, share of the soil's offer in use, ground speed [m/s]. */
 export interface Reading {
   slip: Figure;
   grip: Figure;
@@ -29,10 +29,12 @@ export interface Reading {
 }
 
 /** `peak`: the largest adhesion of the online curve over its scale. */
-export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
-  const slips = wheels.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
+export function reading(ring: Ring, { wheels, driven }: Hello, peak: number): Reading {
+  const watched = driven?.length ? driven : wheels; // a free wheel rolls on where a driven one's speed is lost
+  const slips = watched.map((wheel) => ring.last(`slip_${wheel}`)).filter(Number.isFinite);
+  const lost = watched.filter((wheel) => !Number.isFinite(ring.last(`slip_${wheel}`)));
   const most = Math.max(...slips);
-  const wheel = wheels.find((name) => ring.last(`slip_${name}`) === most) ?? "";
+  const wheel = watched.find((name) => ring.last(`slip_${name}`) === most) ?? "";
   const [share, pace] = [unitFor("share"), unitFor("speed")];
   const spread = 1.96 * ring.last(`slip_${wheel}_std`);
   const offered = peak * ring.last("curve_a");
@@ -43,7 +45,7 @@ export function reading(ring: Ring, { wheels }: Hello, peak: number): Reading {
   return {
     slip: {
       value: slips.length ? most : NaN,
-      shown: [fixed(most, share), slips.length ? `${wheel}, ± ${fixed(spread, share)}` : Math.abs(v) < STANDING ? "standing" : "not known"],
+      shown: [fixed(most, share), slips.length ? `${wheel}, ± ${fixed(spread, share)}${lost.length ? `; ${lost.join(", ")} not known` : ""}` : Math.abs(v) < STANDING ? "standing" : "not known"],
     },
     grip: { value: grip, shown: [fixed(grip, share), known ? `µ ${digits(used, 2)} of ${digits(offered, 2)}` : wheels.some((name) => ring.names.includes(`adhesion_${name}`)) ? `µ ${digits(used, 2)}; the soil's maximum is not known yet` : "needs a drive torque"] },
     speed: { value: v, shown: [fixed(v, pace), Number.isFinite(v) ? `± ${fixed(1.96 * ring.last("ground_speed_std"), pace)}` : "not known"] },

@@ -1,9 +1,9 @@
 """A WebSocket server of our own, which the studio's pages and any script read.
 
-First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "wheels", "events"}``; of many vehicles the one asked for by
-``/?vehicle=NAME``, else the first, with its ``name`` and all ``vehicles``. Then JSON texts ``{"kind": "estimate", …}``, ``status``,
-``soil``, ``ground``, ``setpoint``; the ``kind`` of an event is its own. A client that asks for binary gets estimates as little-endian
-doubles: time [s], 1 if predicted, the place of the event in ``events``, then ``columns`` in order.
+First comes a JSON text: ``{"kind": "hello", "version", "vehicle", "columns", "wheels", "driven", "events"}``; of many vehicles the one
+asked for by ``/?vehicle=NAME``, else the first, with its ``name`` and all ``vehicles``. Then JSON texts ``{"kind": "estimate", …}``,
+``status``, ``soil``, ``ground``, ``setpoint``; the ``kind`` of an event is its own. A client that asks for binary gets estimates as
+little-endian doubles: time [s], 1 if predicted, the place of the event in ``events``, then ``columns`` in order.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class StudioSink:
         import websockets.asyncio.server  # noqa: F401  # so that a missing package is said at once
 
         self.uri = uri
-        self.broadcast = Broadcast(lambda: {"": (vehicle.name if vehicle else "", columns)})
+        name, free = (vehicle.name, vehicle.free_wheels) if vehicle else ("", ())
+        self.broadcast = Broadcast(lambda: {"": (name, columns, free)})
         self.monitor: Answers | None = None
         self._credentials = Credentials.find()
         if not is_loopback(uri.host) and not self._credentials.token:
@@ -141,11 +142,13 @@ def _is_here(url: str) -> bool:
 class Broadcast:
     """Messages to any number of clients, each with a queue of its own.
 
-    ``vehicles``: by the name in messages what each vehicle is called and its columns; of one alone its name is empty. ``put`` queues a
-    message for the clients of its vehicle; ``subscribe`` gives one client's frames.
+    ``vehicles``: by the name in messages what each vehicle is called, its columns and its free wheels; of one alone its name is empty.
+    ``put`` queues a message for the clients of its vehicle; ``subscribe`` gives one client's frames.
     """
 
-    def __init__(self, vehicles: Callable[[], Mapping[str, tuple[str, Sequence[str]]]]) -> None:
+    def __init__(
+        self, vehicles: Callable[[], Mapping[str, tuple[str, Sequence[str], Sequence[str]]]]
+    ) -> None:
         self.vehicles = vehicles
         self._clients: list[tuple[str, Outbox]] = []
 
@@ -166,11 +169,12 @@ class Broadcast:
         if name not in vehicles:
             hint = suggestion(name, vehicles, "look at /health/ready")
             raise InputError(f"no vehicle {name[:40]!r} sends", hint=hint)
-        vehicle, every = vehicles[name]
+        vehicle, every, free = vehicles[name]
+        wheels = wheels_with("slip", every)
         hello = {
             "kind": "hello", "version": __version__, "vehicle": vehicle,
             "columns": [n for n in every if columns is None or columns.wants(n)],
-            "wheels": list(wheels_with("slip", every)), "events": list(EVENTS),
+            "wheels": list(wheels), "driven": [w for w in wheels if w not in free], "events": list(EVENTS),
         }  # fmt: skip
         return name, {**hello, "name": name, "vehicles": sorted(vehicles)} if name else hello
 

@@ -196,9 +196,12 @@ class ManyService:
         return "\n".join(lines)
 
 
-def _shown(runs: Mapping[str, VehicleRun]) -> dict[str, tuple[str, Sequence[str]]]:
-    """What clients are told of each vehicle: what it is called, and its columns."""
-    return {name: (run.core.vehicle.name or name, run.core.columns) for name, run in runs.items()}
+def _shown(runs: Mapping[str, VehicleRun]) -> dict[str, tuple[str, Sequence[str], Sequence[str]]]:
+    """What clients get of each vehicle: what it is called, its columns and its free wheels."""
+    return {
+        name: (run.core.vehicle.name or name, run.core.columns, run.core.vehicle.free_wheels)
+        for name, run in runs.items()
+    }
 
 
 def _due(run: VehicleRun, now: float) -> bool:
