@@ -222,7 +222,7 @@ def test_without_a_torque_nothing_shows_that_the_wheels_pull_against_a_push(trac
 
 
 def test_an_engine_that_droops_is_no_mistake_of_mass_or_torques(tractor: tg.Vehicle) -> None:
-    """A pull that comes and goes slows the engine in one gear, so thrust falls as the rims gain: 'change by -1.2 times the force ...'."""
+    """A pull that comes and goes slows the engine in one gear, so thrust falls as the rims gain, which a note called wrong."""
     log, noise = steady(120.0), np.random.default_rng(1).standard_normal((2, 1200))
     pull = 20e3 + 8e3 * np.sin(log.time / 1.7) + 4e3 * np.sin(log.time)
     speed = 2.2 - np.interp(log.time - 0.8, log.time, pull) / 1e5

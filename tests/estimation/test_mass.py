@@ -199,6 +199,10 @@ def test_a_vehicle_file_says_where_the_payload_is():
     assert robot().payload_share == pytest.approx([54 / 139, 85 / 139])
     again = tg.Vehicle.from_dict(tanker().to_dict())
     assert again == tanker()
+    bucket = robot(
+        payload={"x": 1.7 * 0.638, "z": 0.4}
+    )  # a loader's, ahead of the front axle: it lifts the rear one
+    assert bucket.payload_share == pytest.approx([1.7, -0.7])
     with pytest.raises(InputError, match=r"payload.x: 20 m is far from between the axles"):
         robot(payload={"x": 20.0})
     with pytest.raises(InputError, match=r"payload.x"):
