@@ -17,8 +17,8 @@ VALUES = [0.2, 0.01, 0.4, 1.5, 0.02, 1.0, 0.05]
 
 
 class LiveService:
-    """Rows at 20 Hz, `step` s apart by their stamps, while `mode` is "measured"; "predicted": predicted ones; "silent": none, but a
-    status a second; "frozen": nothing."""
+    """Rows at 20 Hz, `step` s apart by their stamps, while `mode` is "measured"; "predicted": predicted ones; "slipless": without slip;
+    "silent": none, but a status a second; "frozen": nothing."""
 
     step = 0.05
     vehicles: tuple[str, ...] = ()  # of a service of many; the n-th drives n times as fast as `VALUES` say
@@ -64,7 +64,8 @@ class LiveService:
         row = 0
         while not self._stop.is_set():
             row += 1
-            if self.mode in ("measured", "predicted"):
+            values["slip_a"] = np.nan if self.mode == "slipless" else VALUES[0]
+            if self.mode in ("measured", "predicted", "slipless"):
                 await socket.send(
                     np.array(
                         [row * self.step, float(self.mode == "predicted"), 0.0, *values.values()]

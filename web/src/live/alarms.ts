@@ -3,7 +3,7 @@
 import { digits, fill, h } from "../ui/dom";
 import { numberField } from "../ui/number";
 import { fixed, onUnits, unitFor, withUnit } from "../ui/units";
-import { WARNING, type Reading } from "./numbers";
+import { STANDING, WARNING, type Reading } from "./numbers";
 
 const KEY = "terragrip-alarms";
 /** Seconds between two rings while it lasts; and of one ring. */
@@ -35,6 +35,7 @@ export class Alarms {
   private audio: AudioContext | null = null;
   private rang = -Infinity;
   private causes = "";
+  private blind = ""; // limits that nothing can be compared with
   private isSilent = false;
   private mute = h("span", { class: "bad" });
   private forget = onUnits(() => this.draw());
@@ -55,6 +56,8 @@ export class Alarms {
     const over = (name: string, value: number, limit: number | null): string | false =>
       limit !== null && 100 * value > limit && `${name} ${withUnit(fixed(value, unit), unit)} is over ${withUnit(digits((limit / 100) * unit.scale), unit)}`;
     const causes = [over("Slip", now.slip.value, this.set.slip), over("Grip in use", now.grip.value, this.set.grip)].filter((one) => one !== false);
+    const isBlind = this.set.slip !== null && Number.isNaN(now.slip.value) && Math.abs(now.speed.value) > STANDING;
+    this.blind = isBlind ? "Slip is not known: its alarm cannot sound" : "";
     this.show(causes.join("; "), false);
     if (this.causes || event in WARNING) this.ring(880);
   }
@@ -68,7 +71,7 @@ export class Alarms {
 
   private show(causes: string, isOld: boolean): void {
     this.causes = causes;
-    const text = causes && isOld ? `${causes} in the last measurement` : causes;
+    const text = [causes && isOld ? `${causes} in the last measurement` : causes, this.blind].filter(Boolean).join("; ");
     if (this.element.textContent !== text) fill(this.element, text);
     this.element.hidden = !text;
   }

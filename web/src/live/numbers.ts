@@ -13,7 +13,8 @@ export const WARNING: Record<string, string> = {
 export const LINGER = 2;
 /** Seconds after which a status is out of date (one comes every second). */
 export const STATUS_AGE = 2.5;
-const STANDING = 0.05; // m/s
+/** Speed [m/s] below which a machine stands. */
+export const STANDING = 0.05;
 
 /** A number for alarms, NaN where it is not known; and as it is shown: its digits, and the text below. */
 export interface Figure {
