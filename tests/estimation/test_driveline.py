@@ -236,3 +236,34 @@ def test_an_engine_that_droops_is_no_mistake_of_mass_or_torques(tractor: tg.Vehi
     unlogged = replace(log, channels={n: v for n, v in log.channels.items() if n != "drawbar_force"})
     notes = tg.estimate(unlogged, tractor).notes
     assert not any("In starts and stops" in note for note in notes)
+
+
+def test_a_wheel_of_another_scale_and_a_gyroscope_of_the_wrong_sign_are_named(tractor: tg.Vehicle) -> None:
+    """The mean of the driven wheels shows neither, so nothing was said of them."""
+    time = np.arange(0.0, 240.0, 0.1)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal((8, len(time)))
+    speed, turn = 1.5 + 0.5 * np.sin(time / 7), np.where(time % 40 > 30, 0.2, 0.0)
+    side = {"fl": -0.9, "fr": 0.9, "rl": -0.9, "rr": 0.9}
+    channels = {
+        f"wheel_speed_{w}": (speed + y * turn) / 0.8 + n
+        for (w, y), n in zip(side.items(), noise[:4], strict=True)
+    }
+    channels |= {
+        "ground_speed": speed + noise[4],
+        "angular_velocity_z": turn + noise[5],
+        "engine_speed": speed / 0.8 * 80,
+        "engine_torque": 400.0 + noise[6],
+        "drawbar_force": 20e3 + noise[7],
+    }
+    wide = tg.Vehicle.from_dict(tractor.to_dict() | {"track": 1.8})
+    log = Recording(time, channels)
+
+    def notes(**changed: np.ndarray) -> str:
+        return " ".join(tg.estimate(log.with_channels(**changed), wide).notes)
+
+    assert "rim of" not in notes()
+    assert "wrong sign" not in notes()
+    assert "the rim of rl goes 1.10 times" in notes(wheel_speed_rl=1.1 * channels["wheel_speed_rl"])
+    assert "angular_velocity_z is of the wrong sign" in notes(
+        angular_velocity_z=-channels["angular_velocity_z"]
+    )

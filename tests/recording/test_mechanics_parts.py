@@ -238,6 +238,15 @@ def test_wheels_without_a_drive_beside_a_trailer_have_no_wrong_sign(vehicle: Veh
     assert _balance_warnings(torques(**free), replace(means, thrusts=thrusts), X, vehicle) == []
 
 
+def test_no_wheel_goes_against_the_others_where_all_are_turned(vehicle: Vehicle) -> None:
+    """Less a pull that is as large they do not go with the motion; turned, the torques alone would."""
+    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    pull = 3 * np.cos(np.arange(80) / 7)
+    log = torques(**{f"drive_torque_{w}": -10.0 - (X + pull) / 4 * RADIUS * MASS for w in WHEELS})
+    thrusts = dict.fromkeys(WHEELS, -(X + pull) / 4 - pull / 4)
+    assert _balance_warnings(log, replace(means, thrusts=thrusts), X, vehicle) == []
+
+
 def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
     means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
     log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))

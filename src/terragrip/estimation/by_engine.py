@@ -15,11 +15,14 @@ from terragrip.estimation.slip_only import WHAT_IS_MISSING, slip_reference_in
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.plain_units import size_warnings
+from terragrip.recording.plausibility import warnings_by_check
 from terragrip.recording.survey import first_speeds, joined
 from terragrip.vehicle import Vehicle
 
 _LEAPS = f"drive_torque_{DRIVEN} leaps"
 _ITS_ZERO = "its zero moved, or the signal was lost."
+_BY_WHEEL = ("sides", "exchanged wheels", "turn rate", "turn rate at rest")
+"""Checks whose mistakes the mean of the driven wheels no longer shows."""
 _STARTS = "In starts and stops the drive torques"
 """What these say of the mass is not so: where the ratio changes rows have no torque, and in the rest the engine's inertia counts more."""
 _TAKEN = "a PTO, a pump or a brake took another part of the engine's, or the signal was lost."
@@ -35,7 +38,9 @@ class ByEngine:
         self._whole = whole
         self.machine = DrivenMachine.of_log(whole, original, reference)
         beside = tuple(note for note in reference.notes if note != WHAT_IS_MISSING)
-        self.notes = (*size_warnings(original), *self.machine.notes, *beside)
+        by_wheel = warnings_by_check(whole, original) if original.knows_wheels else {}
+        found = [note for name in _BY_WHEEL for note in by_wheel.get(name, ())]
+        self.notes = (*size_warnings(original), *found, *self.machine.notes, *beside)
         self._waiting: deque[DrivelineTorque] = deque()
 
     def log(self, log: LogBlocks) -> LogBlocks:

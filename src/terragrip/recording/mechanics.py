@@ -267,6 +267,8 @@ def _exchanged(recording: Recording, vehicle: Vehicle, means: Means, forward: Fl
         for w, radius in vehicle.driven_radii.items()
     }
     backward = [w for w, push in own.items() if np.nanmean(push) < 0 and means.fit(push, forward).slope < 0]
+    if len(backward) == len(own):  # the drawbar force and the scale show that
+        backward = []
     plain = abs(together.alike)
     turned = abs(means.fit(means.thrust - 2 * sum(own[w] for w in backward), forward).alike)
     sideways = recording.channels.get("acceleration_y")
