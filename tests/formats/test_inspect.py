@@ -142,6 +142,7 @@ def test_an_empty_column_of_ours_is_told_as_empty(tmp_path: Path, rows: int) -> 
     assert kinds["ground_speed"] == "empty"
     assert inspection.rows == rows
     assert "ground_speed" in inspection.to_text()
+    assert ("has no rows" in inspection.refused) == (rows == 0)
 
 
 def test_the_proposed_profile_works_as_it_stands(tmp_path: Path) -> None:

@@ -77,7 +77,11 @@ def command(
             result[0].refused,
             file=result[0].file,
             hint=how_to_pivot([column.name for column in result[0].columns])
-            or "log the wheels too, or join it to a log that has them",
+            or (
+                "log the wheels too, or join it to a log that has them"
+                if result[0].rows
+                else "check the logger"
+            ),
         )
 
 

@@ -142,7 +142,7 @@ def _ragged(body: bytes, dialect: Dialect, error: Exception, source: str, first:
     for row, line in enumerate(lines, start=first + 1):
         cells = len(split(line, dialect.separator))
         if cells != width:
-            problem = f"has {cells} cells, the header {width}"
+            problem = f"has {cells} cell{'s' * (cells != 1)}, the header {width}"
             return InputError(
                 problem, file=source, place=f"row {row}", hint="give every row the same number of cells"
             )

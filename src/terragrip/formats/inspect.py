@@ -158,7 +158,7 @@ def inspect(
         fitting=fits.names,
         nearly=fits.nearly,
         unfit=unfit,
-        refused="" if ready or fits.names else refusal(present, quiet),
+        refused="" if ready or fits.names else refusal(seen.rows, present, quiet),
         profile=seen.profile_text(proposals, tuple(dbc), os.path.basename(str(log.source))),
     )
 

@@ -96,13 +96,15 @@ def _missing_forces(proposals: Collection[str], wheels: Sequence[str], vehicle: 
     return notes
 
 
-def refusal(channels: Collection[str], silent: Sequence[str]) -> str:
-    """Why nothing can be estimated from a log with these channels, whatever the profile; empty if something can.
+def refusal(rows: int, channels: Collection[str], silent: Sequence[str]) -> str:
+    """Why nothing can be estimated from a log of ``rows`` with these channels, whatever the profile; empty if something can.
 
     ``silent``: sentences on columns that have the name of a speed, but say nothing.
     """
     if "wheel_based_speed" in channels or any(c.startswith("wheel_speed_") for c in channels):
         return ""
+    if not rows:
+        return "has no rows: only the names of its columns were logged"
     result = (
         ", ".join(sorted(c for c in channels if not c.startswith("true_"))) or "nothing that Terragrip knows"
     )

@@ -41,7 +41,7 @@ def read_vbo(path: str, wanted: Wanted, databases: Databases = ()) -> LogTable:
         notes.append("The last row is cut off and was left out.")
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
-            problem = f"has {len(row)} cells, the header {len(names)}"
+            problem = f"has {len(row)} cell{'s' * (len(row) != 1)}, the header {len(names)}"
             raise InputError(
                 problem, file=path, place=f"row {number}", hint="give every row the same number of cells"
             )
