@@ -14,11 +14,15 @@ if TYPE_CHECKING:
 
 
 def window_means(values: Floats, place: Ints, count: int) -> Floats:
-    """Mean of the measured ``values`` (n,) in each of ``count`` windows, NaN where there are none; ``place`` (n,): each value's window."""
+    """Mean of the measured ``values`` (n,) in each of ``count`` windows, NaN where there are none; ``place`` (n,): each value's window,
+    never less than the one before."""
     known = np.isfinite(values)
     if not known.all():
         values, place = values[known], place[known]
-    number, total = np.bincount(place, minlength=count), np.bincount(place, values, count)
+    edges = np.searchsorted(place, np.arange(count + 1))
+    number, used = np.diff(edges), edges[:-1] < len(values)
+    total = np.zeros(count)
+    total[used] = np.add.reduceat(values, edges[:-1][used])
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
 
