@@ -28,8 +28,8 @@ SHADE = """([column, row]) => {
   return [...ink.getContext('2d').getImageData(x, y, 1, 1).data];
 }"""
 INKS = """() => {
-  const { cells, look } = window.terragripField.read();
-  return Array.from({ length: cells.count }, (_, i) => look.paint(i)[1]);
+  const { cells, painting } = window.terragripField.read();
+  return Array.from({ length: cells.count }, (_, i) => painting.paint(i)[1]);
 }"""
 
 

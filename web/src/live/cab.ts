@@ -44,7 +44,7 @@ export const page: Page = (main, { query }) => {
   };
   feed.onState = (_, reason) => {
     why = reason;
-    look();
+    check();
   };
   const forget = onUnits(() => show());
   let asked = false;
@@ -65,12 +65,12 @@ export const page: Page = (main, { query }) => {
       const now = reading(ring, hello, peak);
       for (const name of ["slip", "grip", "speed"] as const) tiles[name].set(now[name]);
       if (!ring.isPredicted) alarms.check(now, event);
-      look();
+      check();
     });
   }
 
   /** The age of the numbers; old ones are struck out, with a message in the largest letters of the page. */
-  function look(): void {
+  function check(): void {
     const { isOld, predicted, waiting, unmeasured } = ageOf(feed, delay, speed, false);
     const dead = isOld || waiting || feed.state !== "connected";
     main.classList.toggle("dead", dead && !predicted);
@@ -80,7 +80,7 @@ export const page: Page = (main, { query }) => {
     fill(age, dead || predicted ? said : `measured ${seconds(unmeasured)} ago`, feed.state === "ended" ? " (the run has ended)" : more && h("small", {}, more));
     alarms.silent(feed.ring.taken > 0 && isOld && feed.state !== "ended");
   }
-  const watch = window.setInterval(look, CHECK);
+  const watch = window.setInterval(check, CHECK);
   // A tablet that goes dark shows nothing at all; where the browser has no such lock, its own settings must keep it awake.
   let lock: WakeLockSentinel | null = null;
   const wake = (): void => {

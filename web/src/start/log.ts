@@ -12,7 +12,7 @@ import { focusOn, refill } from "./focus";
 import { verdict, type Inspection } from "./inspection";
 import { freeName, JobList, stemOf, viewOf } from "./jobs";
 import { MachineMaker } from "./machine";
-import { Mapping, type Look } from "./mapping";
+import { Mapping, type Preview } from "./mapping";
 import type { Parts } from "./wheels";
 
 interface Methods {
@@ -27,14 +27,14 @@ export class LogPage {
   private next = h("div");
   private profile = "";
   private vehicle = "";
-  private look: Look | undefined;
+  private preview: Preview | undefined;
   private mapping: Mapping | undefined;
   private maker: MachineMaker | undefined;
   private methods: Methods | undefined;
   private items: Item[] = [];
   private key = ""; // the log, in its folder
   private left = ""; // as it was left: what the log is read by and estimated with, in words
-  private looks = 0;
+  private checks = 0;
   private queueing = false;
   private hasLabels = false;
   private estimates = "";
@@ -76,7 +76,7 @@ export class LogPage {
   /** The folder has changed: what is said here must not be of files that are others now. */
   private async renew(): Promise<void> {
     await this.reload();
-    if (!this.look && this.read[0] !== "" && this.version(this.log) !== this.read[0]) return this.open(); // it could not be read before
+    if (!this.preview && this.read[0] !== "" && this.version(this.log) !== this.read[0]) return this.open(); // it could not be read before
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement | null;
     const found = document.getElementById("wizard-found");
     if (!select || !found) return; // still opening
@@ -110,10 +110,10 @@ export class LogPage {
     this.vehicle = vehicle || this.onlyVehicle();
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
     this.drawColumns(false); // that the log is read: a long one takes a while
-    this.look = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), this.profile);
-    this.profile ||= this.look?.fitting.find((name) => own.includes(name)) ?? "";
+    this.preview = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), this.profile);
+    this.profile ||= this.preview?.fitting.find((name) => own.includes(name)) ?? "";
     this.left = [this.profile && `read by ${this.profile}`, vehicle && `vehicle ${vehicle}`].filter(Boolean).join(", ");
-    this.drawColumns(!this.profile && !this.look?.ready);
+    this.drawColumns(!this.profile && !this.preview?.ready);
     this.drawMachine();
     this.drawEstimate();
     await this.offerNext();
@@ -126,7 +126,7 @@ export class LogPage {
     [this.profile, this.left] = [profile, ""];
     this.mapping?.forget();
     bind(this.key, { profile });
-    this.look = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), profile);
+    this.preview = await this.mapping?.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), profile);
     this.drawColumns(profile ? (document.getElementById("choose-columns") as HTMLDetailsElement | null)?.open ?? false : true);
     await this.inspect();
   }
@@ -144,7 +144,7 @@ export class LogPage {
   }
 
   private get profiles(): string[] {
-    return [...new Set([...this.of("profile"), ...(this.look?.fitting ?? [])])];
+    return [...new Set([...this.of("profile"), ...(this.preview?.fitting ?? [])])];
   }
 
   private of(kind: string): string[] {
@@ -158,11 +158,11 @@ export class LogPage {
 
   /** Columns: whoever has a profile, or a log with our names, sees one line; else the choice. */
   private drawColumns(choosing: boolean): void {
-    if (!this.look || !this.mapping) {
+    if (!this.preview || !this.mapping) {
       fill(this.columns, this.mapping?.element ?? null);
       return;
     }
-    const none = this.look.ready ? "no profile: the columns have Terragrip's names" : "no profile yet: choose the columns below";
+    const none = this.preview.ready ? "no profile: the columns have Terragrip's names" : "no profile yet: choose the columns below";
     const profile = choice("wizard-profile", this.profiles, this.profile, none);
     profile.addEventListener("change", () => void this.readBy(profile.value));
     const back = this.profile ? h("button", { type: "button", id: "propose", click: () => void this.readBy("") }, "Back to the proposals") : null;
@@ -251,19 +251,19 @@ export class LogPage {
     const found = document.getElementById("wizard-found");
     const go = document.getElementById("wizard-go") as HTMLButtonElement | null;
     if (!found || !go) return;
-    const turn = ++this.looks;
+    const turn = ++this.checks;
     const method = (document.getElementById("wizard-method") as HTMLSelectElement).value || undefined;
     go.disabled = true;
     this.read[1] = this.version(this.vehicle, this.profile);
-    const nothing = !this.profile && !this.look?.ready;
+    const nothing = !this.profile && !this.preview?.ready;
     if (nothing) {
-      fill(found, h("p", { class: "hint" }, this.look ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
+      fill(found, h("p", { class: "hint" }, this.preview ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
       return;
     }
     fill(found, h("p", { class: "hint" }, this.vehicle ? "Trying an estimate …" : "Reading the log …"));
     try {
       const result = await get<Inspection>("inspect", { path: this.log, profile: this.profile || undefined, vehicle: this.vehicle || undefined, method });
-      if (turn !== this.looks) return;
+      if (turn !== this.checks) return;
       const ready = result.ready && this.vehicle !== "";
       this.hasLabels = "soil" in result.recognised;
       fill(
@@ -277,7 +277,7 @@ export class LogPage {
       go.disabled = !ready;
       this.drawNext();
     } catch (error) {
-      if (turn !== this.looks) return;
+      if (turn !== this.checks) return;
       const text = error instanceof Error ? error.message : String(error);
       if (text === SILENT) this.read[1] = ""; // asked again as soon as the studio responds
       fill(found, h("p", { class: "bad", role: "alert" }, text));

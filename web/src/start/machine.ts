@@ -77,9 +77,9 @@ export class MachineMaker {
       h("div", { class: "maker-body" }, h("div", {}, this.form, this.problem), h("div", {}, this.picture, this.costs)),
       h("div", { class: "row end" }, h("label", { for: this.output.id }, "Save as"), this.output, this.save),
     );
-    this.kind.addEventListener("change", () => void this.look());
-    this.signals.addEventListener("change", () => void this.look());
-    this.name.addEventListener("change", () => void this.look());
+    this.kind.addEventListener("change", () => void this.check());
+    this.signals.addEventListener("change", () => void this.check());
+    this.name.addEventListener("change", () => void this.check());
     this.element.addEventListener("submit", (event) => {
       event.preventDefault();
       void this.keep();
@@ -99,14 +99,14 @@ export class MachineMaker {
     const draft = draftOf<Wanted>(output);
     if (!draft) return;
     [this.kind.value, this.signals.value, this.name.value, this.typed] = [draft.machine, draft.signals, draft.name, draft.known];
-    void this.look();
+    void this.check();
   }
 
   /** What the log measures, by the columns that were chosen. */
   measures(signals: string): void {
     if (this.signals.value === signals) return;
     this.signals.value = signals;
-    void this.look();
+    void this.check();
   }
 
   private get wanted(): Wanted {
@@ -114,7 +114,7 @@ export class MachineMaker {
     return { machine: this.kind.value, signals: this.signals.value, known, name: this.name.value };
   }
 
-  private async look(): Promise<void> {
+  private async check(): Promise<void> {
     if (!this.kind.value) return;
     const turn = ++this.turn;
     const now = `${this.kind.value} ${this.signals.value}`;
@@ -135,7 +135,7 @@ export class MachineMaker {
     this.shown = now;
     if (isOther) {
       this.drawFields(made.fields);
-      if (Object.keys(this.wanted.known).length) return this.look();
+      if (Object.keys(this.wanted.known).length) return this.check();
     }
     this.drawTypical(made.fields);
     const known = new Set(made.fields.filter((field) => field.known !== null).map((field) => field.name));
@@ -163,7 +163,7 @@ export class MachineMaker {
       const input = h("input", { type: "text", id: `machine-${field.name}`, value: this.typed[field.name] ?? "", placeholder: typical(field), "aria-describedby": `typical-${field.name}`, autocomplete: "off" });
       input.addEventListener("input", () => {
         clearTimeout(this.timer);
-        this.timer = window.setTimeout(() => void this.look(), PAUSE);
+        this.timer = window.setTimeout(() => void this.check(), PAUSE);
       });
       this.inputs.set(field.name, input);
       return h("div", { class: "asked" }, h("label", { for: input.id }, field.title, " ", h("span", { class: field.needed ? "badge needed" : "badge" }, field.needed ? "needed" : "optional")), input, h("p", { class: "hint", id: `typical-${field.name}` }));

@@ -28,7 +28,7 @@ interface Channel {
   proposals: Proposal[];
 }
 
-export interface Look {
+export interface Preview {
   kept: { time?: Entry; channels: Record<string, Entry> } | null; // what a profile chose
   rows: number;
   ready: boolean;
@@ -59,7 +59,7 @@ export const SIGNALS = { torque: "drive_torque_", wheels: "wheel_speed_" };
 
 export class Mapping {
   readonly element = h("div", { class: "mapping" });
-  private look: Look | undefined;
+  private preview: Preview | undefined;
   private chosen = new Map<string, Choice>();
   private rows = new Map<string, HTMLElement>();
   private readonly refused = h("p", { class: "bad" });
@@ -79,8 +79,8 @@ export class Mapping {
   }
 
   private keep(): void {
-    if (!this.look) return;
-    const draft: Draft = { of: contents(this.look), profile: this.profile, chosen: [...this.chosen], time: this.look.time, names: [...this.names.given] };
+    if (!this.preview) return;
+    const draft: Draft = { of: contents(this.preview), profile: this.profile, chosen: [...this.chosen], time: this.preview.time, names: [...this.names.given] };
     keepDraft(this.log, draft);
   }
 
@@ -90,7 +90,7 @@ export class Mapping {
   }
 
   private state(): string {
-    return JSON.stringify([[...this.chosen].sort(), this.look?.time, [...this.names.given]]);
+    return JSON.stringify([[...this.chosen].sort(), this.preview?.time, [...this.names.given]]);
   }
 
   /** Give up what was not saved. */
@@ -99,46 +99,46 @@ export class Mapping {
   }
 
   /** Go on with what was not saved; whether there was such a thing. */
-  private takeUp(look: Look): boolean {
+  private takeUp(preview: Preview): boolean {
     const draft = draftOf<Draft>(this.log);
-    if (!draft || draft.of !== contents(look) || draft.profile !== this.profile) return false;
+    if (!draft || draft.of !== contents(preview) || draft.profile !== this.profile) return false;
     this.chosen = new Map(draft.chosen);
-    look.time = draft.time;
+    preview.time = draft.time;
     this.names.given = new Map(draft.names);
     return true;
   }
 
   /** Preview the log, with the choice that a `profile` has, else what is proposed; `output` is the profile to write in place of it. */
-  async open(output: string, profile = ""): Promise<Look | undefined> {
+  async open(output: string, profile = ""): Promise<Preview | undefined> {
     const turn = ++this.turn;
     fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
     try {
-      const look = await get<Look>("columns", { path: this.log, profile: profile || undefined });
-      if (turn !== this.turn) return this.look; // another profile was chosen meanwhile
-      this.look = look;
+      const preview = await get<Preview>("columns", { path: this.log, profile: profile || undefined });
+      if (turn !== this.turn) return this.preview; // another profile was chosen meanwhile
+      this.preview = preview;
     } catch (error) {
       fill(this.element, h("p", { class: "bad", role: "alert" }, error instanceof Error ? error.message : String(error)));
       return undefined;
     }
-    const kept = this.look.kept;
+    const kept = this.preview.kept;
     this.profile = kept ? profile : "";
     this.chosen.clear();
     this.kept.clear();
-    for (const channel of this.look.channels) {
+    for (const channel of this.preview.channels) {
       const best = channel.proposals[0];
       const entry = kept?.channels[channel.name];
       if (entry) this.take(channel, entry);
       else if (best && !kept) this.chosen.set(channel.name, { column: keyOf(best), entry: entryOf(best) });
     }
-    this.wheels = [...new Set(this.look.channels.map((channel) => channel.wheel).filter(Boolean))];
+    this.wheels = [...new Set(this.preview.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
-    if (kept?.time) this.look.time = kept.time;
+    if (kept?.time) this.preview.time = kept.time;
     const hint = this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”.";
     this.began = this.state();
-    const unsaved = this.takeUp(this.look);
-    this.names.of(this.look.channels);
+    const unsaved = this.takeUp(this.preview);
+    this.names.of(this.preview.channels);
     this.draw(this.profile || output, unsaved ? "Your choice as you left it, not saved yet." : hint);
-    return this.look;
+    return this.preview;
   }
 
   /** Choose what the profile has for a channel: a proposal, a column, or what it makes of several. */
@@ -155,7 +155,7 @@ export class Mapping {
   }
 
   private nameRows(): void {
-    for (const channel of this.look?.channels ?? []) {
+    for (const channel of this.preview?.channels ?? []) {
       const label = this.rows.get(channel.name)?.querySelector(".channel");
       if (label) label.textContent = this.titleOf(channel);
     }
@@ -177,24 +177,24 @@ export class Mapping {
       { name: `wheel_speed_${wheel}`, title: "turning speed", wheel, unit: "rad/s", proposals: [] },
       { name: `drive_torque_${wheel}`, title: "drive torque, at the wheel", wheel, unit: "N m", proposals: [] },
     ]);
-    this.look?.channels.unshift(...extra);
+    this.preview?.channels.unshift(...extra);
     this.wheels.push(...wheels);
   }
 
   private draw(output: string, hint: string): void {
-    const look = this.look as Look;
+    const preview = this.preview as Preview;
     const name = h("input", { type: "text", id: "profile-output", value: output });
     const use = h("button", { type: "button", class: "primary", id: "use-columns", click: () => void this.save(name.value.trim()) }, "Use these columns");
-    const needed = look.channels.filter((channel) => channel.wheel || this.chosen.has(channel.name) || ["ground_speed", "wheel_based_speed", "drawbar_force"].includes(channel.name));
-    const other = look.channels.filter((channel) => !needed.includes(channel));
+    const needed = preview.channels.filter((channel) => channel.wheel || this.chosen.has(channel.name) || ["ground_speed", "wheel_based_speed", "drawbar_force"].includes(channel.name));
+    const other = preview.channels.filter((channel) => !needed.includes(channel));
     this.sayRefused();
     fill(
       this.element,
       this.refused,
       h("p", { class: "hint" }, hint),
-      look.remarks.map((text) => h("p", { class: "hint" }, text)),
+      preview.remarks.map((text) => h("p", { class: "hint" }, text)),
       this.names.element,
-      this.timeRow(look),
+      this.timeRow(preview),
       h("div", { class: "map-rows", role: "group", "aria-label": "Channels" }, needed.map((channel) => this.row(channel))),
       h("details", {}, h("summary", {}, `${other.length} more channels that help, if the log has them`), h("div", { class: "map-rows" }, other.map((channel) => this.row(channel)))),
       h("div", { class: "row" }, h("label", { for: name.id }, "Save as"), name, use),
@@ -203,23 +203,23 @@ export class Mapping {
 
   /** What the log lacked as it was proposed, until a speed of the wheels is chosen. */
   private sayRefused(): void {
-    const refused = this.look?.refused && this.signals === "bus-speed" && !this.chosen.has("wheel_based_speed") ? this.look.refused : "";
+    const refused = this.preview?.refused && this.signals === "bus-speed" && !this.chosen.has("wheel_based_speed") ? this.preview.refused : "";
     fill(this.refused, refused ? `This log ${refused}. If it has a wheel's speed by another name, choose it.` : null);
   }
 
-  private timeRow(look: Look): HTMLElement {
-    const time = look.time ?? { from: "" };
-    const isOwn = Boolean(time.from) && !look.columns.some((column) => column.name === time.from); // each signal was stamped: MATLAB, CAN, ROS
-    const select = h("select", { id: "time-column" }, isOwn ? h("option", { value: String(time.from), selected: true }, "the log's own times") : h("option", { value: "" }, "– choose –"), look.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
+  private timeRow(preview: Preview): HTMLElement {
+    const time = preview.time ?? { from: "" };
+    const isOwn = Boolean(time.from) && !preview.columns.some((column) => column.name === time.from); // each signal was stamped: MATLAB, CAN, ROS
+    const select = h("select", { id: "time-column" }, isOwn ? h("option", { value: String(time.from), selected: true }, "the log's own times") : h("option", { value: "" }, "– choose –"), preview.columns.filter((column) => column.kind !== "text").map((column) => h("option", { value: column.name, selected: column.name === time.from }, column.name)));
     const unit = h("input", { type: "text", id: "time-unit", class: "unit", value: String(time.unit ?? "s"), "aria-label": "Unit of the time" });
-    const why = h("p", { class: "why hint" }, isOwn ? "each signal has its times in the log" : look.time ? "runs forward" : "No column looks like time: choose it.");
+    const why = h("p", { class: "why hint" }, isOwn ? "each signal has its times in the log" : preview.time ? "runs forward" : "No column looks like time: choose it.");
     const update = (): void => {
-      look.time = { ...(look.time ?? {}), from: select.value };
-      if (unit.value.trim() && unit.value.trim() !== "s") look.time.unit = unit.value.trim();
-      else delete look.time.unit;
+      preview.time = { ...(preview.time ?? {}), from: select.value };
+      if (unit.value.trim() && unit.value.trim() !== "s") preview.time.unit = unit.value.trim();
+      else delete preview.time.unit;
     };
     select.addEventListener("change", () => {
-      const column = look.columns.find((one) => one.name === select.value);
+      const column = preview.columns.find((one) => one.name === select.value);
       unit.value = column?.unit ?? "s"; // not that of the column before
       why.textContent = column ? chosenByHand(column, "s") : "";
       update();
@@ -236,7 +236,7 @@ export class Mapping {
   }
 
   private fillRow(channel: Channel, box: HTMLElement): void {
-    const look = this.look as Look;
+    const preview = this.preview as Preview;
     const choice = this.chosen.get(channel.name);
     const proposal = channel.proposals.find((one) => keyOf(one) === choice?.column);
     const select = h("select", { id: `column-${channel.name}` }, h("option", { value: "" }, "– none –"));
@@ -251,7 +251,7 @@ export class Mapping {
       select.append(option(kept.column, kept.column, kept.column === choice?.column));
       likely.add(kept.column);
     }
-    const rest = look.columns.filter((column) => !likely.has(column.name) && column.kind === (channel.name === "soil" ? "text" : "number"));
+    const rest = preview.columns.filter((column) => !likely.has(column.name) && column.kind === (channel.name === "soil" ? "text" : "number"));
     const group = h("optgroup", { label: "Any other column" });
     for (const column of rest) group.append(option(column.name, column.name, column.name === choice?.column));
     select.append(group);
@@ -261,7 +261,7 @@ export class Mapping {
       this.fillRow(channel, box);
       document.getElementById(select.id)?.focus();
     });
-    const column = look.columns.find((one) => one.name === (proposal?.columns[0] ?? choice?.column));
+    const column = preview.columns.find((one) => one.name === (proposal?.columns[0] ?? choice?.column));
     fill(
       box,
       h("label", { for: select.id, class: "channel" }, this.titleOf(channel)),
@@ -305,7 +305,7 @@ export class Mapping {
       return;
     }
     const proposal = channel.proposals.find((one) => keyOf(one) === column);
-    const unit = this.look?.columns.find((one) => one.name === column)?.unit;
+    const unit = this.preview?.columns.find((one) => one.name === column)?.unit;
     const kept = this.kept.get(channel.name);
     const entry = kept?.column === column ? { ...kept.entry } : proposal ? entryOf(proposal) : { from: column, ...(unit && channel.unit ? { unit } : {}) };
     this.chosen.set(channel.name, { column, entry });
@@ -314,7 +314,7 @@ export class Mapping {
 
   /** A doubtful proposal of another quantity gives up the column that was chosen for `channel`. */
   private release(channel: Channel, column: string): void {
-    for (const other of this.look?.channels ?? []) {
+    for (const other of this.preview?.channels ?? []) {
       const isGuess = other.proposals.some((one) => one.doubt !== "" && keyOf(one) === column) && this.chosen.get(other.name)?.column === column;
       if (!isGuess || other.title === channel.title) continue;
       this.chosen.delete(other.name);
@@ -343,9 +343,9 @@ export class Mapping {
     }
     const isOld = output === this.profile && output !== this.own;
     if (isOld && !confirm(`Replace ${output}?`)) return;
-    const named = new Map(this.look?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
+    const named = new Map(this.preview?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
     const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [named.get(name) ?? name, choice.entry]));
-    const wanted = { log: this.log, output, time: this.look?.time ?? { from: "time" }, channels, vehicle, replace: isOld || output === this.own };
+    const wanted = { log: this.log, output, time: this.preview?.time ?? { from: "time" }, channels, vehicle, replace: isOld || output === this.own };
     const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted), "columns");
     if (!kept) return;
     this.own = this.profile = kept.path;
@@ -355,8 +355,8 @@ export class Mapping {
   }
 }
 
-function contents(look: Look): string {
-  return [look.rows, ...look.columns.map((column) => column.name)].join("\n");
+function contents(preview: Preview): string {
+  return [preview.rows, ...preview.columns.map((column) => column.name)].join("\n");
 }
 
 function option(value: string, text: string, selected: boolean): HTMLElement {

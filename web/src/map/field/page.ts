@@ -33,7 +33,7 @@ interface Shown {
   cells: Cells;
   raster: Raster;
   index: Index;
-  look: Painted;
+  painting: Painted;
 }
 
 export const page: Page = (main, { notices, query }) => {
@@ -138,12 +138,12 @@ export const page: Page = (main, { notices, query }) => {
     const raster = new Raster(field);
     const inside = inArea(cells, area.value as AreaName);
     const index = new Index(cells, inside);
-    const look = painted(layer.value as LayerName, cells, field, mapped, area.value as AreaName, fade.checked);
-    shown = { field, mapped, cells, raster, index, look };
+    const painting = painted(layer.value as LayerName, cells, field, mapped, area.value as AreaName, fade.checked);
+    shown = { field, mapped, cells, raster, index, painting };
     picked = at ? (index.at(...at) ?? null) : null;
-    box.dataset.cells = String(raster.paint(cells, inside, look));
+    box.dataset.cells = String(raster.paint(cells, inside, painting));
     fade.disabled = layer.value !== "value" && layer.value !== "soil";
-    showLegend(legend, look.legend);
+    showLegend(legend, painting.legend);
     refill(panel, panelOf(field, mapped, anomaliesHere(), goTo, jobs.findLast((job) => job.kind === "map" && job.output === path && job.state === "done")));
     map.getCanvas().setAttribute("aria-label", `${titleOf(mapped.name, field)} by cell: the arrow keys go from cell to cell, + and − zoom, 0 shows all`);
     tell(picked);
@@ -245,7 +245,7 @@ export const page: Page = (main, { notices, query }) => {
 
   async function sheet(): Promise<Sheet | undefined> {
     if (!shown) return undefined;
-    const { raster, look } = shown;
+    const { raster, painting } = shown;
     const { clientWidth: width, clientHeight: height } = map.getContainer();
     const canvas = h("canvas", { width: SHARP * width, height: SHARP * height });
     const pen = canvas.getContext("2d");
@@ -258,7 +258,7 @@ export const page: Page = (main, { notices, query }) => {
     return sheetOf({
       map,
       title: path,
-      legend: look.legend,
+      legend: painting.legend,
       base: await under.picture(),
       draw: (ink, to, { x, y }) => {
         ink.picture(cells, [1 / SHARP, 0, 0, 1 / SHARP, x, y]);
