@@ -149,9 +149,8 @@ class Vehicle(Part):
 
     def _check_geometry(self) -> None:
         """Lengths that two axles need, and what they make of payload and steering."""
-        if (
-            self.payload is not None and not -1.0 <= self.payload.x / (self.wheelbase or np.inf) <= 2.5
-        ):  # a loader's bucket is up to 2
+        # A loader's bucket is up to two wheelbases from the rear axle.
+        if self.payload is not None and not -1.0 <= self.payload.x / (self.wheelbase or np.inf) <= 2.5:
             raise Fault(
                 f"{self.payload.x:g} m is far from between the axles, {self.wheelbase:g} m apart",
                 "count from the rear axle forward",

@@ -38,9 +38,8 @@ class ByEngine:
         self._whole = whole
         self.machine = DrivenMachine.of_log(whole, original, reference)
         beside = tuple(note for note in reference.notes if note != WHAT_IS_MISSING)
-        by_wheel = warnings_by_check(whole, original) if original.knows_wheels else {}
-        found = [note for name in _BY_WHEEL for note in by_wheel.get(name, ())]
-        self.notes = (*size_warnings(original), *found, *self.machine.notes, *beside)
+        by_wheel = [n for notes in warnings_by_check(whole, original, _BY_WHEEL).values() for n in notes]
+        self.notes = (*size_warnings(original), *by_wheel, *self.machine.notes, *beside)
         self._waiting: deque[DrivelineTorque] = deque()
 
     def log(self, log: LogBlocks) -> LogBlocks:

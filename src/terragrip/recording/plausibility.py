@@ -6,7 +6,7 @@ says nothing itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -64,10 +64,12 @@ def unit_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     return [note for notes in warnings_by_check(recording, vehicle).values() for note in notes]
 
 
-def warnings_by_check(recording: Recording, vehicle: Vehicle | None) -> dict[str, list[str]]:
-    """Those sentences by the name of their check, of checks that found something."""
+def warnings_by_check(
+    recording: Recording, vehicle: Vehicle | None, names: Iterable[str] | None = None
+) -> dict[str, list[str]]:
+    """Those sentences by the name of their check, of checks that found something; ``names``: of these checks, None: of all."""
     log = _Log(recording, vehicle)
-    found = {check.name: log.found(check.name) for check in CHECKS}
+    found = {name: log.found(name) for name in names or (check.name for check in CHECKS)}
     return {name: [str(note) for note in notes] for name, notes in found.items() if notes}
 
 

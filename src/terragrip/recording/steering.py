@@ -46,9 +46,8 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     if min(straight.sum(), turns.sum()) < _FEWEST:
         return []
     for (name, axle), own, other in zip(axles, rims, rims[::-1], strict=True):
-        ratio = np.log(
-            (own / (other if axle.driven else ground))[moving]
-        )  # on a headland what is driven slips less
+        beside = other if axle.driven else ground  # on a headland what is driven slips less
+        ratio = np.log((own / beside)[moving])
         share = (ratio[turns] - median(ratio[straight])) / path[turns]
         if np.mean(np.abs(share - 1.0) < _NEAR) > _MOST:
             most = -np.expm1(-quantile(path[turns], 0.95))

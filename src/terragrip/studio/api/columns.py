@@ -122,8 +122,8 @@ def _rolling(
             "unit": "rad/s",
             "scale": float(f"{speed / known.radii[wheel]:.6g}"),
         }
-        for wheel, driven in zip(known.wheels, known.driven, strict=True)
-        if not driven and f"wheel_speed_{wheel}" not in channels
+        for wheel in known.free_wheels
+        if f"wheel_speed_{wheel}" not in channels
     }
 
 

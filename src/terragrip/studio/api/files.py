@@ -135,12 +135,8 @@ def _rolling(found: Collection[str], machine: Path | None) -> list[str]:
     if machine is None or "ground_speed" not in found:
         return []
     vehicle = Vehicle.load(machine)
-    missing = [
-        (wheel, driven)
-        for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True)
-        if f"wheel_speed_{wheel}" not in found
-    ]
-    return [] if any(driven for _, driven in missing) else [wheel for wheel, _ in missing]
+    missing = [wheel for wheel in vehicle.wheels if f"wheel_speed_{wheel}" not in found]
+    return missing if set(missing) <= set(vehicle.free_wheels) else []
 
 
 def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | None:
