@@ -32,6 +32,7 @@ import peer
 import pull
 from marked import put
 from priority import prefer
+from sink_messages import measured_row
 from terragrip.estimation import TractionEstimator
 from terragrip.live import read_record
 from terragrip.recording import Recording
@@ -185,8 +186,9 @@ def listen(sink: socket.socket, got: np.ndarray, rate: int, dropped: list[int]) 
         except TimeoutError:
             return
         now = time.perf_counter()
-        if data.startswith(b'{"time":') and b'"predicted":false' in data[:200]:
-            got[round(rate * float(data[8 : data.index(b",")]))] = now
+        row = measured_row(data)
+        if row is not None:
+            got[round(rate * row["time"])] = now
             quiet = 0
         elif b"row_rate" in data:
             quiet += 1

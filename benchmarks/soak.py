@@ -42,6 +42,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "estimati
 import pull
 from drives import drive
 from priority import prefer
+from sink_messages import measured_row
 from soak_checks import checks
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
@@ -179,8 +180,9 @@ class Life:
         self.sink.close()
 
     def _hear(self, data: bytes) -> None:
-        if data.startswith(b'{"time":') and b'"predicted":false' in data:
-            self.seen.append(float(data[data.index(b'"arrival":') + 10 : data.index(b',"event"')]))
+        row = measured_row(data)
+        if row is not None:
+            self.seen.append(row["arrival"])
         elif b"row_rate" in data:
             status = json.loads(data)
             self.rows, self.waiting = status["rows"], status["waiting"]

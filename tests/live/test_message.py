@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +13,9 @@ from hypothesis import strategies as st
 from terragrip.estimation.estimator import Estimate
 from terragrip.live.message import Columns
 from terragrip.live.outputs import Row
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for sink_messages.py
+from sink_messages import measured_row
 
 
 def row(values: dict[str, float], time: float = 1.5, predicted: bool = False) -> Row:
@@ -51,3 +56,11 @@ def test_only_the_wanted_columns_are_written():
         "event",
         "predicted",
     }
+
+
+def test_the_benchmarks_know_a_measured_row_when_one_comes():
+    """bench_live and the soak once waited for rows by their first bytes, and counted none when these changed."""
+    sent = Columns("nis").json(row({"nis": 3.0}))
+    assert measured_row(sent) == json.loads(sent)
+    assert measured_row(Columns("nis").json(row({"nis": 3.0}, predicted=True))) is None
+    assert measured_row(b'{"kind":"status","predicted":false}') is None
