@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from terragrip.recording.schema import REFERENCE, unit_of
@@ -70,6 +71,7 @@ _BY_WHEEL = {
 }
 
 
+@lru_cache(1000)
 def column_named(name: str) -> Column:
     """Unit and description of a column of estimates; of a foreign one ``Column("", "")``."""
     if name.startswith(REFERENCE):

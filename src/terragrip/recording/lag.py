@@ -130,7 +130,7 @@ def wheels_of(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Speed | 
         np.abs(values) if when is time else np.interp(time, when, np.abs(values))
         for when, values in filter(None, wheels)
     ]
-    return Speed(time, np.mean(known, axis=0), None) if known else None
+    return Speed(time, sum(known[1:], known[0]) / len(known), None) if known else None
 
 
 def measured(time: Floats, values: npt.NDArray[Any] | None) -> tuple[Floats, Floats] | None:
@@ -169,8 +169,10 @@ def _own(wheels: Speed, ground: Speed, pace: float, seconds: float) -> float:
     regressed as in `_refined`, with a part of the lag that goes with the speed.
     """
     softest = pace / (STANDARD_GRAVITY * STIFFNESS)
+    if softest <= _USUAL:
+        return softest
     mine, theirs = _regular(wheels.time, wheels.values), _regular(ground.time, ground.values)
-    if mine is None or theirs is None or softest <= _USUAL:
+    if mine is None or theirs is None:
         return softest
     time, rate, jerk = _rates(mine)
     speed = _at(time, theirs, seconds)
