@@ -121,6 +121,11 @@ def test_power_goes_through_the_gears_less_accessories_and_the_engines_own() -> 
     np.testing.assert_allclose(overrun.torque, 100 / 0.8 * (-40 - 10))
     reverse = through(np.full(20, 200.0), wheels=-2.0)
     np.testing.assert_allclose(reverse.torque, -steady.torque)
+    motor = through(np.full(20, -200.0), torque=-300.0, wheels=-2.0)  # it turns backward itself
+    np.testing.assert_allclose(motor.torque, -steady.torque)
+    np.testing.assert_allclose(motor.std, steady.std)
+    np.testing.assert_allclose(through(-rising, -300.0, -2.0).torque, -through(rising).torque)
+    np.testing.assert_allclose(through(np.full(20, -200.0), torque=40.0, wheels=-2.0).torque, -overrun.torque)
     assert torque_spread(np.array([0.0, 1.0]), np.ones(2), 0.8, 1.0, 0.0).tolist()[1] == 0.8
 
 

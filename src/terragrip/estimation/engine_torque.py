@@ -113,8 +113,12 @@ def driveline_torque(
     wheel_speed: Floats,
     radius: float,
 ) -> DrivelineTorque:
-    """The torque of a driveline to the wheels (n,), of which ``wheel_speed`` (n,) [rad/s] is the mean and ``radius`` [m]."""
-    speed, wheels = held(time, channels["engine_speed"]), held(time, wheel_speed)
+    """The torque of a driveline to the wheels (n,), of which ``wheel_speed`` (n,) [rad/s] is the mean and ``radius`` [m].
+
+    A motor that turns backward, as a hydrostatic drive's in reverse, has a negative engine speed, and a torque that counts the same way.
+    """
+    turning, wheels = held(time, channels["engine_speed"]), held(time, wheel_speed)
+    speed, way = np.abs(turning), np.where(turning < 0, -1.0, 1.0)
     known = np.abs(wheels) * radius > _SLOWEST * np.sqrt(GRAVITY * radius)
     known &= speed > 0
     ratio = np.divide(speed, wheels, out=np.full(len(time), np.nan), where=known)
@@ -131,7 +135,7 @@ def driveline_torque(
     )
     power, power_std = _taken(driveline, pto_turns(time, channels))
     into = torque_into_gears(
-        engine.at(channels, time),
+        way * engine.at(channels, time),
         speed,
         np.nan_to_num(acceleration),
         other_power=power,
