@@ -160,7 +160,7 @@ def test_an_unmeasured_pull_is_at_most_what_motion_and_slope_leave_of_the_thrust
     """Newton's second law, of 139 kg; [m/s²]."""
     rows = np.ones(50, dtype=bool)
     slope = None if climb is None else np.full(50, climb)
-    means = Means(np.arange(50), 50, rows, np.full(50, 0.1), np.ones(50), slope)
+    means = Means(np.arange(50), np.arange(50.0), rows, np.full(50, 0.1), np.ones(50), slope)
     log = Recording.from_frame({n: v for n, v in columns.items() if n != "drawbar_force"})
     none, most = _pulls(log, vehicle, means, np.full(50, 300.0))
     assert not none.any()

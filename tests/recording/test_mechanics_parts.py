@@ -32,7 +32,7 @@ RADIUS, MASS = 0.2, 139.0
 
 def windows(n: int, climb: np.ndarray | None = None) -> Means:
     """n windows of one row each, all of them used."""
-    return Means(np.arange(n), n, np.ones(n, dtype=bool), np.zeros(n), np.ones(n), climb)
+    return Means(np.arange(n), np.arange(float(n)), np.ones(n, dtype=bool), np.zeros(n), np.ones(n), climb)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def torques(turned: tuple[str, ...] = (), **more: np.ndarray) -> Recording:
 def test_which_of_torques_and_accelerometer_is_wrong_the_speed_decides(
     vehicle: Vehicle, forward: float, thrust: float, words: str
 ) -> None:
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80))
     log = torques()
     thrusts = dict.fromkeys(WHEELS, thrust * X / 4)
     notes = _balance_warnings(log, replace(means, thrusts=thrusts), forward * X, vehicle)
@@ -221,7 +221,7 @@ def test_an_accelerometer_alone_is_backward_from_three_errors_below_none(
 def test_wheels_that_drive_against_the_others_are_named(
     vehicle: Vehicle, turned: tuple[str, ...], words: str
 ) -> None:
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80))
     thrusts = {w: (-1 if w in turned else 1) * X / 4 for w in WHEELS}
     notes = " ".join(_balance_warnings(torques(turned), replace(means, thrusts=thrusts), X, vehicle))
     assert notes == "" if not words else words in notes
@@ -229,7 +229,7 @@ def test_wheels_that_drive_against_the_others_are_named(
 
 def test_wheels_without_a_drive_beside_a_trailer_have_no_wrong_sign(vehicle: Vehicle) -> None:
     """Four-wheel drive is off: their sensors' zeros, less their share of what a trailer pulls, fall as the others' thrust rises."""
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80))
     free = {f"drive_torque_{w}": np.full(80, -0.1) - 0.01 * X for w in WHEELS[:2]}
     pull, rough = 2 * X, 1.5 * np.cos(np.arange(80) * 2.1)
     thrusts = dict.fromkeys(WHEELS[:2], -pull / 4) | dict.fromkeys(
@@ -240,7 +240,7 @@ def test_wheels_without_a_drive_beside_a_trailer_have_no_wrong_sign(vehicle: Veh
 
 def test_no_wheel_goes_against_the_others_where_all_are_turned(vehicle: Vehicle) -> None:
     """Less a pull that is as large they do not go with the motion; turned, the torques alone would."""
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80))
     pull = 3 * np.cos(np.arange(80) / 7)
     log = torques(**{f"drive_torque_{w}": -10.0 - (X + pull) / 4 * RADIUS * MASS for w in WHEELS})
     thrusts = dict.fromkeys(WHEELS, -(X + pull) / 4 - pull / 4)
@@ -248,7 +248,7 @@ def test_no_wheel_goes_against_the_others_where_all_are_turned(vehicle: Vehicle)
 
 
 def test_torques_that_go_with_the_other_axis_are_told(vehicle: Vehicle) -> None:
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80))
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80))
     log = torques(acceleration_y=np.convolve(X, [0.0, 1.0, 0.0], "same"))
     sideways = np.random.default_rng(1).normal(size=80)
     (note,) = _balance_warnings(log, replace(means, thrusts=dict.fromkeys(WHEELS, X / 4)), sideways, vehicle)
@@ -263,7 +263,7 @@ def test_pitch_is_held_against_what_the_accelerometer_reads_beyond_the_speed(
     slope: float, with_roll: bool, words: str
 ) -> None:
     climb, roll = 0.3 * X, 0.1 * np.cos(np.arange(80) / 5.0)
-    means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), climb)
+    means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80), climb)
     log = Recording(np.arange(80.0), {"roll": roll, "pitch": np.arcsin(climb / G)})
     seen = means.of(np.sin(roll)) if with_roll else slope * climb
     notes = pitch_warnings(log, means, np.nan_to_num(X + seen))
@@ -365,7 +365,7 @@ def test_without_an_accelerometer_change_of_speed_and_climb_tell(
 ) -> None:
     climb = np.cos(np.arange(80) / 5.0)
     for grade in (None, climb):
-        means = Means(np.arange(80), 80, np.ones(80, dtype=bool), X, np.ones(80), grade)
+        means = Means(np.arange(80), np.arange(80.0), np.ones(80, dtype=bool), X, np.ones(80), grade)
         force = X + (0.0 if grade is None else grade)
         notes = " ".join(
             _thrust_warnings(replace(means, thrusts=dict.fromkeys(WHEELS, scale * force / 4)), vehicle)

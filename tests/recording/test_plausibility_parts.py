@@ -78,6 +78,24 @@ def test_a_clock_set_to_summer_time_is_named_where_everything_goes_on(vehicle: V
     assert "summer" not in said(vehicle, time=time + 3600 * later, **channels, latitude=50 + 0.2 * later)
 
 
+def test_a_clock_set_from_1970_in_the_drive_is_named_and_the_rest_is_checked(vehicle: Vehicle) -> None:
+    """By positions it had no solution, by torques and speeds a thousand million windows, 12 GB."""
+    time = 0.05 * np.arange(3000)
+    set_there = np.where(time < 75, time, time + 1.7e9)
+    speed = 1 + 0.3 * np.sin(time / 7)
+    channels = {
+        "ground_speed": 3.6 * speed,
+        "latitude": 50 + np.cumsum(speed) * 0.05 / 111e3,
+        "longitude": 11 + 1e-8 * time,
+    }
+    for wheel in vehicle.wheels:
+        channels |= {f"wheel_speed_{wheel}": speed / RADIUS, f"drive_torque_{wheel}": 20 + np.sin(time)}
+    assert "years" not in said(vehicle, time=time, **channels)
+    notes = said(vehicle, time=set_there, **channels)
+    assert "time leaps by 53.9 years from 74.95 s to the next row: was the clock set there" in notes
+    assert "ground_speed is 3.59 times the speed of the positions: it may be in km/h" in notes
+
+
 def test_where_two_units_give_one_ratio_both_are_named(vehicle: Vehicle) -> None:
     """Rims of .165 m in m/s turn as many times too slowly as rims in revolutions per second: the slip decides between them."""
     wheel = {"radius": 0.165, "inertia": 0.27}

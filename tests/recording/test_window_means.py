@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from terragrip.recording import Recording
-from terragrip.recording.window_means import averaged
+from terragrip.recording.window_means import averaged, window_means, windows_of
 
 
 def test_rows_of_a_window_become_their_mean_and_a_window_without_a_value_is_missing() -> None:
@@ -30,3 +30,14 @@ def test_means_of_a_dead_sensor_are_equal_but_for_rounding() -> None:
     found = averaged(log, 0.05).channels["wheel_speed_l"]
     assert len(found) == 20
     assert np.ptp(found) <= 1e-12 * value
+
+
+def test_of_a_pause_of_years_few_windows_are_left_and_those_after_it_start_when_they_do() -> None:
+    time = np.r_[7.0 + np.arange(9) / 2, 1.7e9 + np.arange(9) / 2]
+    place, starts = windows_of(time, 2.0)
+    assert len(starts) < 30
+    within = time - starts[place]
+    assert np.all((within >= 0) & (within < 2.0))
+    assert np.isnan(
+        window_means(time, place, len(starts))[3:6]
+    ).all()  # none has neighbours on both sides of the pause

@@ -21,7 +21,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording import Recording
 from terragrip.recording.held import held_periods, without_held
-from terragrip.recording.window_means import window_means
+from terragrip.recording.window_means import window_means, windows_of
 
 Span = tuple[float, float]
 
@@ -196,8 +196,8 @@ def _windows(
         log = log.select((log.time >= span[0]) & (log.time <= span[1]))
         if len(log) == 0:
             return np.empty(0), np.zeros(0, dtype=bool)
-    place = ((log.time - log.time[0]) / WINDOW).astype(np.intp)
-    count = int(place[-1]) + 1
+    place, starts = windows_of(log.time, WINDOW)
+    count = len(starts)
     ground, slowest = _means(log.channels["ground_speed"], place, count)
     rim, least = _means(radius * log.channels[channel], place, count)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -19,7 +19,7 @@ from terragrip.recording.pulls import PULL, pull_warnings, silent_cell
 from terragrip.recording.ranks import median
 from terragrip.recording.rolling import radius_warnings
 from terragrip.recording.schema import rim_names
-from terragrip.recording.window_means import window_means
+from terragrip.recording.window_means import window_means, windows_of
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.written_times import moment
@@ -73,18 +73,28 @@ class Fit:
 
 @dataclass(frozen=True)
 class Means:
-    """Windows of driving forward (n,): ``place`` of each row of the log among all ``count`` windows, which of them are used (``rows``),
-    of which each is ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s], g sin(pitch),
-    ``climb`` [m/s²], if the log has it, and each driven wheel's share of the ``thrusts`` (`thrusts_of`), if they are known."""
+    """Windows of driving forward (n,): ``place`` of each row of the log among all, when these start (``starts`` [s]), which of them are
+    used (``rows``), each ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s],
+    g sin(pitch), ``climb`` [m/s²], if the log has it, and each driven wheel's share of the ``thrusts`` (`thrusts_of`), if known."""
 
     place: Ints
-    count: int
+    starts: Floats
     rows: Bools
     change: Floats
     speed: Floats
     climb: Floats | None = None
     length: float = _WINDOW
     thrusts: dict[str, Floats] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Of all windows."""
+        return len(self.starts)
+
+    @property
+    def middles(self) -> Floats:
+        """Of the used windows (n,) [s]."""
+        return self.starts[self.rows] + self.length / 2
 
     @property
     def thrust(self) -> Floats:
@@ -138,7 +148,7 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means 
         notes += pull_warnings(means, recording, vehicle) or silent_cell(recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, vehicle)
-        found = found or zero_warnings(recording, means, forward)
+        found = found or zero_warnings(means, forward)
         found = (
             found or pitch_warnings(recording, means, forward) or _offset_warnings(means, forward, vehicle)
         )
@@ -162,7 +172,7 @@ def shortfall_warnings(recording: Recording, means: Means | None) -> list[str]:
         return []
     first, last = low[0], low[-1] + _STRETCH - 1
     inside = rest[known[first : last + 1]]
-    begin, end = recording.time[0] + (np.flatnonzero(means.rows)[known[[first, last]]] + 0.5) * means.length
+    begin, end = means.middles[known[[first, last]]]
     return [
         f"From about {moment(begin)} to {moment(end)} s the drive torques over the wheel radius less drawbar_force are "
         f"{-np.mean(inside):.2g} of "
@@ -186,8 +196,8 @@ def means_of(recording: Recording, vehicle: Vehicle | None = None) -> Means | No
     if speed is None or len(known) < _LEAST:
         return None
     length = max(_WINDOW, 2 * median(np.diff(recording.time[known])))
-    place = ((recording.time - recording.time[0]) / length).astype(np.intp)
-    count = int(place[-1]) + 1
+    place, starts = windows_of(recording.time, length)
+    count = len(starts)
     if place.min() < 0 or place.max() >= count:  # time decreases: refused elsewhere
         return None
     mean = window_means(speed, place, count)
@@ -199,7 +209,7 @@ def means_of(recording: Recording, vehicle: Vehicle | None = None) -> Means | No
     rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))
     if rows.sum() < _LEAST:
         return None
-    means = Means(place, count, rows, change[rows], mean[rows], length=length)
+    means = Means(place, starts, rows, change[rows], mean[rows], length=length)
     if "pitch" in recording.channels:
         means = replace(means, climb=STANDARD_GRAVITY * means.of(np.sin(recording.channels["pitch"])))
     return means if vehicle is None else replace(means, thrusts=thrusts_of(recording, vehicle, means))

@@ -68,7 +68,7 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     return _late_warnings(recording, means, means.climb, observed)
 
 
-def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
+def zero_warnings(means: Means, forward: Floats) -> list[str]:
     """A sentence where the accelerometer's reading beyond speed and pitch leaps and stays so: a zero that moved in the drive."""
     if means.climb is None:
         return []
@@ -78,7 +78,7 @@ def zero_warnings(recording: Recording, means: Means, forward: Floats) -> list[s
     if step is None:
         return []
     at, leap = step
-    when = recording.time[0] + (np.flatnonzero(means.rows)[known][at] - 0.5) * means.length
+    when = means.middles[known][at] - means.length
     return [
         f"From {moment(when)} s on acceleration_x reads {abs(leap):.2g} m/s² {'more' if leap > 0 else 'less'} beyond speed and pitch than "
         f"before: the zero of one of the two moved, and soil resistance is {abs(leap) / STANDARD_GRAVITY:.2g} off before or after. Correct "

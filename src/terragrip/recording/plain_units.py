@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _EMPTY = 0.5  # of the vehicle file's mass: few machines are so much lighter without their load
 _ENOUGH = 4000  # rows that show how far rows are apart
 _HOUR, _ON_TIME = 3600.0, 3.0  # s, and times the usual distance of rows: no pause lasts for just an hour
+_YEAR = 31_556_952.0  # s: no drives of one log are so far apart
 _SPARSE, _DENSE = 5.0, 1e-4  # s between samples: no log of a drive has more, or less
 _BOUNDS = (
     ("mass", "kg", "volume", (0.3, 3000.0), ("t", "g")),
@@ -101,7 +102,7 @@ def mass_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
 
 
 def spacing_warnings(recording: Recording) -> list[str]:
-    """Rows that are further apart, or closer, than those of a drive, a time written as hhmmss, and a clock set to summer time."""
+    """Rows that are further apart, or closer, than those of a drive, a time written as hhmmss, and a clock set in the log."""
     if len(recording) < 10:
         return []
     step = np.diff(recording.time)
@@ -116,6 +117,12 @@ def spacing_warnings(recording: Recording) -> list[str]:
         return [
             f"time leaps by an hour from {recording.time[hour[0]]:.10g} s to the next row: was the clock set to summer time? Write times "
             "in UTC, or subtract 3600 s from there on; now nothing is known for an hour."
+        ]
+    last = int(np.argmax(step))
+    if step[last] > _YEAR and spacing < _SPARSE:
+        return [
+            f"time leaps by {step[last] / _YEAR:.3g} years from {recording.time[last]:.10g} s to the next row: was the clock set there, "
+            "as by a receiver's first fix? Subtract the leap from there on; now nothing is known for so long."
         ]
     # Instants of two clocks may be close by chance.
     mean = float(recording.time[-1] - recording.time[0]) / len(step)

@@ -137,7 +137,7 @@ def slower_warnings(
     sensor, left positive. None: straight ahead, and each hub may be slower by the turn that the rims of all axles show."""
     if means is None:
         return []
-    when = recording.time[0] + (np.flatnonzero(means.rows) + 0.5) * means.length
+    when = means.middles
     straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
     if turn is None:

@@ -15,6 +15,7 @@ from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import RATIOS
 from terragrip.recording.track import Track
 from terragrip.recording.turns import filled, straight_rows
+from terragrip.recording.window_means import windows_of
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -221,7 +222,7 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> t
     speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
     length = max(_WAY_WINDOW, least / max(quantile(speed, 0.95), 1e-9))
-    edges = np.arange(track.time[0], track.time[-1], length / 2)
+    edges = windows_of(track.time, length / 2)[1]
     edges = edges[: len(edges) - (len(edges) + 1) % 2]  # two halves to a window
     if len(edges) < 3:
         return 0.0, 0.0
@@ -229,7 +230,7 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> t
     chord = np.hypot(np.diff(north[::2]), np.diff(east[::2]))
     halves = np.hypot(np.diff(north), np.diff(east)).reshape(-1, 2).sum(axis=1)
     edges, made = edges[::2], np.diff(np.interp(edges[::2], recording.time, way))
-    moving = made > 0.3 * quantile(made, 0.95)
+    moving = (np.diff(edges) < 1.1 * length) & (made > 0.3 * quantile(made, 0.95))
     for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
         moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
     straight = moving & (halves < _STRAIGHT * chord)

@@ -21,7 +21,7 @@ from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.turns import filled
-from terragrip.recording.window_means import window_means
+from terragrip.recording.window_means import window_means, windows_of
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
@@ -179,13 +179,13 @@ def sign_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     if len(known) < _WINDOWS or np.any(np.diff(recording.time) < 0):
         return []
     length = max(_WINDOW, 2 * median(np.diff(known)))
-    place = ((recording.time - recording.time[0]) / length).astype(np.intp)
+    place, starts = windows_of(recording.time, length)
 
     def mean(values: Floats) -> Floats:
-        plain = window_means(filled(recording.time, values), place, int(place[-1]) + 1)
+        plain = window_means(filled(recording.time, values), place, len(starts))
         return np.r_[np.nan, (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4, np.nan]
 
-    speed = window_means(ground, place, int(place[-1]) + 1)
+    speed = window_means(ground, place, len(starts))
     needed = np.r_[np.nan, (speed[2:] - speed[:-2]) / (2 * length), np.nan]
     slows = needed < -_STEADY
     if "drawbar_force" in channels:

@@ -29,6 +29,7 @@ _JUMP = 1.0  # m, or what is driven from fix to fix at the speed that a twentiet
 _FAST = 0.95
 _OFF = 5.0  # times what half of the steps are off at least, or
 _LONGER = 8.0  # times what half of them change in length: a receiver that takes another correction
+_PAUSE = 1e4  # s: a fit across more, where a clock was set, has no solution
 _DENSE = 40
 """Fixes a window: denser ones, as of positions interpolated to the rate of the wheels, count as their means."""
 _BLOCK = 200_000
@@ -98,7 +99,8 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
         return None
     half = span // 2
     middle = slice(half, fixes - half)
-    fits = [_fitted(time, x, np.arange(half, fixes - half), span, 2) for x in (north, east)]
+    near = np.r_[0.0, np.cumsum(np.minimum(np.diff(time), _PAUSE))]
+    fits = [_fitted(near, x, np.arange(half, fixes - half), span, 2) for x in (north, east)]
     (_, vn, an), (_, ve, ae) = (result.T for result, _ in fits)
     an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
     speed = np.hypot(vn, ve)

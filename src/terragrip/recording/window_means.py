@@ -13,6 +13,20 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
 
+_PAUSE = 10  # windows: more than any of them is compared with
+
+
+def windows_of(time: Floats, length: float) -> tuple[Ints, Floats]:
+    """The window of ``length`` [s] of each row (n,), and when each window starts [s]. Of a longer pause `_PAUSE` windows are left: a clock
+    set from 1970 in the middle of a log would make a thousand million."""
+    place = np.floor((time - time[0]) / length)
+    shut = np.cumsum(np.maximum(np.diff(place, prepend=0.0) - _PAUSE, 0.0))
+    place = (place - shut).astype(np.intp)
+    number = np.arange(int(place[-1]) + 1)
+    after = np.minimum(np.searchsorted(place, number), len(time) - 1)
+    return place, np.asarray(time[0] + length * (number + shut[after]))
+
+
 def window_means(values: Floats, place: Ints, count: int) -> Floats:
     """Mean of the measured ``values`` (n,) in each of ``count`` windows, NaN where there are none; ``place`` (n,): each value's window,
     never less than the one before."""

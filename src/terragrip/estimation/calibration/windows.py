@@ -16,7 +16,7 @@ from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.loads import GRAVITY, wheel_shares
 from terragrip.physics.slip import hub_speed, middle_speed
 from terragrip.recording import Recording
-from terragrip.recording.window_means import window_means
+from terragrip.recording.window_means import window_means, windows_of
 from terragrip.vehicle import Vehicle
 
 _BLOCK_COUNT = 40  # stretches of track wanted,
@@ -82,8 +82,8 @@ def windows(recordings: Sequence[Recording], vehicle: Vehicle, length: float) ->
 
 
 def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: float) -> Windows:
-    bin_of = ((recording.time - recording.time[0]) / length).astype(np.intp)
-    n, wheels = int(bin_of[-1]) + 1, vehicle.wheels
+    bin_of, starts = windows_of(recording.time, length)
+    n, wheels = len(starts), vehicle.wheels
 
     def mean(name: str, absent: float = np.nan, power: int = 1) -> Floats:
         values = recording.channels.get(name)
@@ -125,7 +125,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     )
     return Windows(
         recording=np.full(n, index, dtype=np.intp),
-        start=recording.time[0] + length * np.arange(n),
+        start=starts,
         count=samples("ground_speed"),
         torque_count=np.min(
             [samples(f"drive_torque_{w}") for w, on in zip(wheels, vehicle.driven, strict=True) if on]
