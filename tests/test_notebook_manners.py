@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
@@ -199,8 +200,66 @@ def test_what_a_terminal_shows_is_one_line_and_a_mistyped_column_is_suggested(
     assert f"a={curve.parameters_['a']:.4g}" in repr(curve)
     assert max(len(repr(one)) for one in (estimates, run.recording, curve)) < 600
     for table in (estimates, run.recording):
-        with pytest.raises(KeyError, match="did you mean ground_speed"):
+        with pytest.raises(KeyError, match="no column ground_sped; did you mean ground_speed"):
             table["ground_sped"]
+
+
+def test_tables_are_read_by_name_and_say_so(run: Any, estimates: Estimates) -> None:
+    """`list(recording)` was an AttributeError of an int, `pd.DataFrame(estimates)` a column of names."""
+    for table in (run.recording, estimates):
+        assert list(table) == list(table.names) == list(table.to_pandas())
+        assert "time" in table
+        assert 0 not in table
+        uses: list[Callable[[], Any]] = [
+            lambda one=table: one[:5],
+            lambda one=table: one[0],
+            lambda one=table: one[["time", "ground_speed"]],
+            lambda one=table: one[one["ground_speed"] > 0.1],
+            lambda one=table: np.array(one),
+            lambda one=table: pd.DataFrame(one),
+        ]
+        for use in uses:
+            with pytest.raises(
+                TypeError, match=r"rows are \w+\.select\(rows\), a DataFrame is \w+\.to_pandas\(\)"
+            ):
+                use()
+        with pytest.raises(AttributeError, match=r"no 'head': a column is \w+\['time'\]"):
+            table.head()
+        assert not hasattr(table, "keys")
+
+
+def test_what_is_no_vehicle_is_refused_by_the_way_to_one(run: Any) -> None:
+    """A page of pydantic's, or `'str' object has no attribute 'wheels'`."""
+    data = run.vehicle.to_dict()
+    for wrong, way in (
+        (data, r"from_dict\(data\)"),
+        ("robot.yaml", r"load\(path\)"),
+        (None, r"load\(path\)"),
+    ):
+        for call in (
+            lambda it: tg.estimate(run.recording, it),
+            lambda it: tg.calibrate(run.recording, it),
+            tg.TractionEstimator,
+        ):
+            with pytest.raises(InputError, match=f"is no vehicle; give what Vehicle.{way} returns"):
+                call(wrong)
+    assert tg.Vehicle(**data) == run.vehicle
+    for make, match in (
+        (lambda: tg.Vehicle("robot.yaml"), r"Vehicle\.load\(path\) reads a file"),
+        (lambda: tg.Vehicle(mass=100), "axles: is missing; add it"),
+        (lambda: tg.Vehicle(**data | {"mas": 100}), "mas: unknown key; did you mean mass"),
+        (lambda: tg.Vehicle(**data | {"mass": "heavy"}), "mass: 'heavy' is not a number with a unit"),
+        (lambda: setattr(run.vehicle, "mass", 300), "mass: cannot be changed; change the file"),
+        (lambda: tg.Profile({}), r"Profile\.from_dict\(data\) a dict"),
+    ):
+        with pytest.raises(InputError, match=match):
+            make()
+
+
+def test_a_file_of_estimates_needs_a_name(run: Any, estimates: Estimates) -> None:
+    for call in (estimates.write, lambda it: tg.estimate_file(run.recording, run.vehicle, it)):
+        with pytest.raises(InputError, match="NoneType is no path; give the path of a file"):
+            call(None)
 
 
 def test_slips_in_per_cent_are_refused(estimates: tg.Estimates) -> None:

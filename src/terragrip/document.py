@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -43,6 +43,25 @@ class Part(BaseModel):
     PAGE: ClassVar[str | None] = None
     """The page of the documentation that lists the document's keys; errors name it."""
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    if not TYPE_CHECKING:
+
+        def __init__(self, /, *parts: Any, **data: Any) -> None:
+            """From keywords with the content of the file; raises InputError as `validate` does."""
+            name = type(self).__name__
+            if parts:
+                hint = f"{name}.load(path) reads a file, {name}.from_dict(data) a dict"
+                raise InputError(f"{name} takes keywords alone", hint=hint)
+            try:
+                super().__init__(**data)
+            except ValidationError as error:
+                raise _input_error(error, Document(data, ""), self.PAGE) from error
+
+        __init__.__pydantic_base_init__ = True  # pydantic's name for one that `model_validate` need not call
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        hint = "change the file, or what to_dict() gives, and make another with from_dict(data)"
+        raise InputError("cannot be changed", place=name, hint=hint)
 
     @model_validator(mode="before")
     @classmethod

@@ -6,6 +6,7 @@ The frame is the body's: x forward, z up. Axles are listed front to rear, wheels
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -340,6 +341,13 @@ class Vehicle(Part):
         return _frozen(
             np.array([self.calibration.drive_torque_offset.get(name, 0.0) for name in self.wheels])
         )
+
+
+def require_vehicle(vehicle: object) -> None:
+    """Raise InputError unless ``vehicle`` is one."""
+    if not isinstance(vehicle, Vehicle):
+        way = "what Vehicle.from_dict(data)" if isinstance(vehicle, Mapping) else "what Vehicle.load(path)"
+        raise InputError(f"{type(vehicle).__name__} is no vehicle", hint=f"give {way} returns")
 
 
 def _frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -32,6 +32,22 @@ def test_what_is_no_table_is_refused_by_its_type(table: Any) -> None:
         columns_of(table, "x.csv")
 
 
+def test_a_lazy_table_is_refused_by_the_way_to_its_rows() -> None:
+    import polars as pl
+
+    with pytest.raises(InputError, match=r"LazyFrame is not a table; give what its \.collect\(\) returns"):
+        columns_of(pl.LazyFrame({"time": [0.0]}), None)
+
+
+def test_geopandas_and_record_batches_are_tables() -> None:
+    """ "GeoDataFrame is not a table", and Arrow's own error on a batch with missing values."""
+    geopandas = pytest.importorskip("geopandas")
+    pa = pytest.importorskip("pyarrow")
+    assert columns_of(geopandas.GeoDataFrame({"time": [0.0, 0.1]}), None)["time"].tolist() == [0.0, 0.1]
+    batch = pa.record_batch({"time": [0.0, 0.1], "ground_speed": [1.0, None]})
+    assert columns_of(batch, None)["ground_speed"].tolist() == pytest.approx([1.0, np.nan], nan_ok=True)
+
+
 def test_columns_of_one_length_and_of_one_name_each() -> None:
     with pytest.raises(InputError, match=r"column b.*has 2 rows, the first column 3"):
         columns_of({"a": [1, 2, 3], "b": [1, 2]}, None)

@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from terragrip.errors import InputError
 from terragrip.estimation.by_engine import ByEngine
 from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.estimates import Estimates
@@ -21,7 +20,7 @@ from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
 from terragrip.recording.alignment import aligned
 from terragrip.recording.counted import refuse_counted
-from terragrip.vehicle import Vehicle
+from terragrip.vehicle import Vehicle, require_vehicle
 
 if TYPE_CHECKING:
     import os
@@ -98,10 +97,7 @@ def estimated(
     reached.
     """
     options = options or RunOptions()
-    if not isinstance(vehicle, Vehicle):
-        raise InputError(
-            f"{type(vehicle).__name__} is no vehicle", hint="give what Vehicle.load(path) returns"
-        )
+    require_vehicle(vehicle)
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
         driven = ByEngine(whole, vehicle)
         yield from driven.completed(

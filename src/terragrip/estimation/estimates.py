@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
@@ -14,11 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
-from terragrip.errors import InputError, suggestion
+from terragrip.errors import InputError
 from terragrip.estimation.arrow import choices, codes_of, floats, texts, values_of
 from terragrip.estimation.columns import column_named, wheels_with
 from terragrip.estimation.engine import EVENTS
 from terragrip.recording.clock import clock_index
+from terragrip.recording.table import ByName
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +34,7 @@ METADATA_KEY = b"terragrip"
 
 
 @dataclass(frozen=True, eq=False)
-class Estimates:
+class Estimates(ByName):
     """Estimates of one recording.
 
     ``time`` (n,) [s]; ``columns`` float64 (n,) by name in the table's order, then the recording's own columns
@@ -62,29 +63,15 @@ class Estimates:
     about: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.names
-
     @property
     def names(self) -> tuple[str, ...]:
         """All columns in the table's order."""
         return ("time", *self.columns, *self.labels, "event")
 
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """One column (n,); raises KeyError if there is none."""
-        if name == "time":
-            return self.time
+    def _column(self, name: str) -> npt.NDArray[Any]:
         if name == "event":
             return np.array(EVENTS, dtype=object)[self.event_codes]
-        if name not in self.labels and name not in self.columns:
-            raise KeyError(suggestion(name, self.names) or name)
-        return self.labels[name] if name in self.labels else self.columns[name]
+        return self.time if name == "time" else {**self.columns, **self.labels}[name]
 
     def __repr__(self) -> str:
         of = (self.about.get("vehicle") or {}).get("name", "a vehicle")

@@ -19,7 +19,7 @@ from terragrip.estimation.sealed import seal, understood, unseal
 from terragrip.estimation.settings import Thresholds, sample_slots, settings_of
 from terragrip.recording.lag import delay_of, lag_within
 from terragrip.recording.schema import is_own, split_channel
-from terragrip.vehicle import Vehicle
+from terragrip.vehicle import Vehicle, require_vehicle
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -114,6 +114,7 @@ class TractionEstimator:
         rims: Collection[Rim] = (),
         dead_band: float = 0.0,
     ) -> None:
+        require_vehicle(vehicle)
         self.vehicle = vehicle
         self.method = method_named(method).name
         self.held = dict(held or {})

@@ -55,7 +55,9 @@ def read(
     if not isinstance(path, str | os.PathLike):
         from terragrip.formats.sources import merged
 
-        several = hasattr(path, "__iter__") and not (isinstance(path, bytes) or hasattr(path, "read"))
+        several = hasattr(path, "__iter__") and not (
+            isinstance(path, bytes | Recording) or hasattr(path, "read")
+        )
         paths: list[Any] = list(path) if several else [path]
         chosen_ones = _each(profile, paths)
         for number, one in enumerate(paths, 1):

@@ -39,7 +39,11 @@ def frame_of(table: Any, source: str | None) -> Frame:
     beside = {name: stated[whole] for whole, name in zip(columns, names, strict=True) if whole in stated}
     beside = {name: unit for name, unit in beside.items() if unit and name not in behind}
     foreign = [f"{n} in {u}" for n, u in beside.items() if _is_foreign(n, u)]
-    notes: tuple[str, ...] = (f"Units by the table's attributes: {', '.join(foreign)}.",) if foreign else ()
+    notes: tuple[str, ...] = (
+        (f"Units by the table's attributes, which its arithmetic keeps: {', '.join(foreign)}.",)
+        if foreign
+        else ()
+    )
     indices = (
         [one.index for one in table.values() if hasattr(one, "iloc")] if isinstance(table, Mapping) else []
     )
@@ -126,11 +130,11 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
 
     Raises InputError on anything else, on a name that occurs twice and on columns of unlike length.
     """
-    package = type(frame).__module__.partition(".")[0]
     pairs: list[tuple[Any, Any]]
+    lazy = next((way for way in ("collect", "compute") if {way, "columns"} <= {*dir(frame)}), None)
     if isinstance(frame, Mapping):
         pairs = _variables(frame)
-    elif package == "pandas" and hasattr(frame, "columns"):
+    elif not lazy and hasattr(getattr(frame, "columns", None), "nlevels"):  # pandas, GeoPandas
         if frame.columns.nlevels > 1:
             hint = f"choose one, frame[{frame.columns[0][0]!r}], or write each name in one"
             raise InputError("has names of several levels", file=source, hint=hint)
@@ -146,16 +150,15 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
                     level=[name for name in levels if name not in (*frame.columns, "None")]
                 )
         pairs = [(name, _from_pandas(series)) for name, series in frame.items()]
-    elif package == "polars" and hasattr(frame, "get_columns"):
-        pairs = [(series.name, series.to_numpy()) for series in frame.get_columns()]
-    elif package == "pyarrow" and hasattr(frame, "column_names"):
+    elif hasattr(frame, "__arrow_c_stream__") and hasattr(frame, "columns"):  # Arrow, polars, DuckDB
+        import pyarrow as pa
+
+        frame = pa.table(frame)
         pairs = [(name, frame.column(k).to_numpy()) for k, name in enumerate(frame.column_names)]
     else:
-        raise InputError(
-            f"{type(frame).__name__} is not a table",
-            file=source,
-            hint="give what tg.read(path) returns, a DataFrame or a dict of arrays",
-        )
+        problem = f"{type(frame).__name__} is not a table"
+        hint = "give what tg.read(path) returns, a DataFrame or a dict of arrays"
+        raise InputError(problem, file=source, hint=f"give what its .{lazy}() returns" if lazy else hint)
     columns: dict[str, npt.NDArray[Any]] = {}
     for name, values in pairs:
         if str(name) in columns:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -32,8 +32,54 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 
+class ByName:
+    """A table whose columns are read by name, ``table["time"]``; iteration gives the names, ``len`` the rows."""
+
+    time: Floats
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns in the table's order."""
+        raise NotImplementedError
+
+    def _column(self, name: str) -> npt.NDArray[Any]:
+        """The column of a name that there is."""
+        raise NotImplementedError
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and name in self.names
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """One column (n,); raises KeyError if there is none, and TypeError on rows or lists of names."""
+        if not isinstance(name, str):
+            raise TypeError(self._usage())
+        if name not in self.names:
+            hint = suggestion(name, self.names, f"the columns are {', '.join(self.names)}")
+            raise KeyError(f"there is no column {name}; {hint}")
+        return self._column(name)
+
+    def __array__(self, *_: Any, **__: Any) -> NoReturn:
+        """Raises TypeError: as an array, or a DataFrame of it, a table would be a list of its names."""
+        raise TypeError(self._usage())
+
+    if not TYPE_CHECKING:  # which would then take any attribute for granted
+
+        def __getattr__(self, name: str) -> NoReturn:
+            raise AttributeError(f"there is no {name!r}: {self._usage()}")
+
+    def _usage(self) -> str:
+        me = type(self).__name__.lower()
+        return f"a column is {me}['time'], rows are {me}.select(rows), a DataFrame is {me}.to_pandas()"
+
+
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(ByName):
     """Measured channels on one time base (columns and units: architecture.md, contracts).
 
     ``time`` (n,) [s] increases; ``channels`` are float64 (n,) by name, NaN = not measured at that
@@ -120,19 +166,13 @@ class Recording:
                 checks.refuse_place(name, channels[name], source)
         return cls(time, channels, labels, source), remarks
 
-    def __len__(self) -> int:
-        return len(self.time)
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns: time, channels, labels."""
+        return (TIME, *self.channels, *self.labels)
 
-    def __contains__(self, name: str) -> bool:
-        return name == TIME or name in self.channels or name in self.labels
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """The column ``name``: time, a channel or a label; raises KeyError if there is none."""
-        if name == TIME:
-            return self.time
-        if name not in self.labels and name not in self.channels:
-            raise KeyError(suggestion(name, [*self.channels, *self.labels]) or name)
-        return self.labels[name] if name in self.labels else self.channels[name]
+    def _column(self, name: str) -> npt.NDArray[Any]:
+        return self.time if name == TIME else {**self.channels, **self.labels}[name]
 
     def __repr__(self) -> str:
         span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self) else "no row"

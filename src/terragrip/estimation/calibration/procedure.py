@@ -29,7 +29,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
-from terragrip.vehicle import Vehicle
+from terragrip.vehicle import Vehicle, require_vehicle
 
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
 _SENSOR_BIAS = 0.03  # m/s^2 where the vehicle gives none, of an accelerometer that is level to .2 deg
@@ -77,13 +77,14 @@ def calibrate(
     InputError: there is no log, or one does not fit the vehicle.
     """
     given: Any = recordings
-    several = hasattr(given, "__iter__") and not hasattr(given, "columns")  # of a table they are names
-    logs: list[Any] = list(given) if several else [given]
+    alone = isinstance(given, Recording) or hasattr(given, "columns") or not hasattr(given, "__iter__")
+    logs: list[Any] = [given] if alone else list(given)
     if strange := [one for one in logs if not isinstance(one, Recording)]:
         raise InputError(
             f"{type(strange[0]).__name__} is no recording",
             hint="give what tg.read(path) returns, or a list of them",
         )
+    require_vehicle(vehicle)
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from terragrip.errors import InputError, missing_package
+from terragrip.files import path_of
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -67,7 +68,7 @@ KINDS: dict[str, FileKind] = {
 
 def require_suffix(path: str | os.PathLike[str]) -> FileKind:
     """What a file's name means; raises InputError where its suffix is none of `KINDS`, or what it needs is not installed."""
-    suffix = Path(path).suffix.lower()
+    suffix = Path(path_of(path)).suffix.lower()
     if suffix not in KINDS:
         problem = f"estimates cannot be written as {suffix!r}" if suffix else "the name has no suffix"
         named = f"{', '.join(list(KINDS)[:-1])} or {list(KINDS)[-1]}"
