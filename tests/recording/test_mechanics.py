@@ -119,6 +119,17 @@ def test_a_mistake_is_named(factors: dict[str, float], expected: str) -> None:
         assert expected in notes_on(scaled(drive(seed), factors))
 
 
+def test_a_rate_of_turn_in_degrees_is_named_straight_ahead_too() -> None:
+    """On a run of 34 s it made a slip of .20 one of .34 without a word: without a turn nothing was in proportion to it."""
+    noise = np.random.default_rng(5).standard_normal((5, 15000))
+    straight = drive() | {"angular_velocity_z": -0.006 + 0.002 * noise[4]}
+    for k, wheel in enumerate(WHEELS):
+        both = straight["wheel_speed_fl"] + straight["wheel_speed_fr"]
+        straight |= {f"wheel_speed_{wheel}": both / 2 + 0.02 * noise[k]}
+    assert notes_on(straight) == ""
+    assert "it may be in deg/s" in notes_on(scaled(straight, {"angular_velocity_z": 180 / np.pi}))
+
+
 @pytest.mark.parametrize(
     ("factors", "expected"),
     [

@@ -10,7 +10,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.lag import is_copy
 from terragrip.recording.ranks import quantile
 from terragrip.recording.track import Track
-from terragrip.recording.turns import SURE, agreement, filled, side_differences, windows
+from terragrip.recording.turns import LEAST_TURN, SURE, WINDOW, agreement, filled, side_differences, windows
 from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
@@ -120,7 +120,34 @@ def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, trac
         ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
         if 12 < ratio < 100:
             return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
-    return ""
+    return _straight_scale(recording, yaw, vehicle, others)
+
+
+def _straight_scale(
+    recording: Recording, yaw: Floats, vehicle: Vehicle | None, others: dict[str, Floats]
+) -> str:
+    """Where the gyroscope turns much and one of ``others`` hardly at all: straight ahead no rates of turn are in proportion."""
+    ground = recording.channels.get("ground_speed")
+    if ground is None or vehicle is None or not vehicle.track:
+        return ""
+    still: list[str] = []
+    size = 0.0
+    for who, turn in others.items():
+        values = np.array([yaw, turn, filled(recording.time, ground)])
+        means = windows(recording.time, np.where(np.isfinite(values).all(axis=0), values, np.nan))
+        if not means.size or np.sum(np.abs(means[0])) * WINDOW < LEAST_TURN:
+            continue
+        own, other, pace = np.sqrt(np.mean(means**2, axis=1))
+        if abs(agreement(recording.time, yaw, turn)) >= SURE:
+            return ""
+        if own > max(12 * other, _UNLIKE * pace / vehicle.track):
+            still, size = [*still, who], float(own)
+    if not still:
+        return ""
+    return (
+        f"angular_velocity_z turns by {size:.2g} rad/s, {' and '.join(still)} hardly at all: it may be in deg/s "
+        "(1 deg/s is 0.01745 rad/s), or its zero is off. Slips are wrong by it."
+    )
 
 
 def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> str:
