@@ -62,6 +62,8 @@ def test_it_says_what_was_driven_what_is_assumed_and_what_next(drive: tuple[tg.E
     assert len(text.splitlines()) <= 24
     assert text.startswith("Innok Heros 444 (4 wheels): ")
     assert "\n  by wheel" in text
+    head, row = (next(one for one in text.splitlines() if word in one) for word in ("speed m/s", "  all "))
+    assert len(head) == len(row), "names stand over the ends of their columns"
     assert f"{estimates['distance'][-1]:.1f} m in 40.0 s" in text
     assert "Assumed: considered as unknown drive_torque_gain ±2 %" in text
     assert "the vehicle is not calibrated" in text
@@ -85,6 +87,18 @@ def test_blocks_give_the_summary_of_the_whole(drive: tuple[tg.Estimates, str]) -
         )
         tally.add(part)
     assert tally.text(estimates.notes).splitlines() == text.splitlines()
+
+
+def test_a_label_that_begins_with_a_blocks_last_row_has_its_time(drive: tuple[tg.Estimates, str]) -> None:
+    """A row lasts until the next one, which the next block has."""
+    estimates, _ = drive
+    moving = estimates.event_codes == 0
+    first = int(np.flatnonzero((estimates.soil == "sand") & moving)[0])
+    tally = Tally()
+    for rows in (slice(first - 99, first + 1), slice(first + 1, first + 101)):
+        tally.add(estimates.select(rows))
+    assert moving[first - 99 : first + 101].all()
+    assert tally.moving == pytest.approx({"loam": 0.99, "sand": 1.00}, abs=1e-6)
 
 
 def test_nothing_considered_is_said_and_doubtful_units_come_first() -> None:

@@ -144,3 +144,10 @@ def test_cells_that_are_datetimes_or_times_of_day_are_times(of: Callable[[Any], 
     cells = pd.Series([of(first + timedelta(seconds=t)) for t in LOG["time"]], dtype=object)
     got = Recording.from_frame(LOG.assign(time=cells)).time
     np.testing.assert_allclose(got - got[0], LOG["time"], atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["V", "furlong"])
+def test_a_column_that_is_none_of_ours_may_have_any_unit(unit: str) -> None:
+    other = LOG.assign(battery=[24.0, 24.1, 24.2])
+    other.attrs["units"] = {"battery": unit}
+    np.testing.assert_array_equal(Recording.from_frame(other).time, LOG["time"])

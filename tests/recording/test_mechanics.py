@@ -320,3 +320,10 @@ def test_resistances_that_change_with_the_slope_are_no_scale_of_torques() -> Non
     """A light machine on hills, whose accelerometer agrees with ground speed and pitch: nothing says that a torque is wrong."""
     drawn = families.draw(families.Kind("light", "saturating", "multirate", "rigid"), 9515, rate=50.0)
     assert unit_warnings(drawn.recording, drawn.vehicle) == []
+
+
+def test_a_torque_that_fails_after_a_second_leaves_no_warning_of_numpy() -> None:
+    """'Mean of empty slice' stood on the terminal, with the path of our file."""
+    columns = drive()
+    columns["drive_torque_rr"] = np.where(columns["time"] < 1, columns["drive_torque_rr"], np.nan)
+    assert notes_on(columns) == ""

@@ -85,6 +85,8 @@ def test_a_joint_that_bends_is_named() -> None:
     vehicle = tg.Vehicle.from_dict(machine().to_dict() | {"articulated": True})
     (note,) = unit_warnings(bent, vehicle)
     assert note.startswith("In 3")
+    slowest, bending = 1.8, 0.6 / 3  # m/s, rad/s
+    assert float(note.split("by up to ")[1][:4]) == pytest.approx(TRACK / 2 * bending / slowest, abs=0.01)
     assert (
         "of the driving the joint bends: front and rear then turn by different rates, of which the log has one"
         in note

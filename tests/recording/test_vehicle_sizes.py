@@ -36,6 +36,7 @@ DRIVELINE = {"efficiency": 0.85, "reference_torque": 750}
         ({"uncertainty": {"slope": 1}}, "slope is 1 rad.*is it 1 deg"),
         ({"uncertainty": {"wheel_radius": 1}}, "wheel_radius is 1,.*is it 1 %"),
         ({"sensors": {"pitch": 0.3}}, "pitch is 0.3 rad.*is it 0.3 deg"),
+        ({"bearing_resistance": 6000}, "bearing_resistance is 6000 N s/rad.*check its unit"),
         ({"wheel": {"radius": 0.8, "inertia": 0.08}}, "inertia is 0.08 kg m.*check its unit"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,11 @@ def test_compare_says_how_far_apart():
     assert row["to"] == pytest.approx(fitted().reach)
     other = SoilLibrary({"fine": fitted(seed=2)})
     assert SoilLibrary({"fine": fitted()}).compare(other)[0]["intervals_meet"] == {"a": True}
+    # an interval inside the other one meets it, one beyond it on either side does not
+    for low, high, meets in ((0.45, 0.55, True), (0.1, 0.3, False), (0.7, 0.9, False)):
+        mine, theirs = (replace(fitted(), interval={"a": ends}) for ends in ((0.4, 0.6), (low, high)))
+        (row,) = SoilLibrary({"fine": mine}).compare(SoilLibrary({"fine": theirs}))
+        assert row["intervals_meet"] == {"a": meets}
 
 
 BAD = {

@@ -276,7 +276,7 @@ def _exchanged(recording: Recording, vehicle: Vehicle, means: Means, forward: Fl
         w: means.of(recording.channels[f"drive_torque_{w}"]) / radius / vehicle.mass
         for w, radius in vehicle.driven_radii.items()
     }
-    backward = [w for w, push in own.items() if np.nanmean(push) < 0 and means.fit(push, forward).slope < 0]
+    backward = [w for w, push in own.items() if np.nansum(push) < 0 and means.fit(push, forward).slope < 0]
     if len(backward) == len(own):  # the drawbar force and the scale show that
         backward = []
     plain = abs(together.alike)

@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import t as student
 
 from terragrip.estimation import Calibration, calibrate
+from terragrip.estimation.calibration import gains
 from terragrip.estimation.calibration.gains import _disagreement
 from terragrip.estimation.calibration.procedure import _channel_errors
 from terragrip.estimation.calibration.sharing import Sharing, fit_shared_gains
@@ -255,3 +256,14 @@ def test_a_soil_of_few_stretches_is_not_held_against_another() -> None:
     other = GAIN * np.array([1, 1, 1.2, 0.9])
     assert _disagreement(on_soils(GAIN, other, windows=150)) > 2
     assert _disagreement(on_soils(GAIN, other, windows=140)) == 1.0
+
+
+def test_a_stated_load_is_wrong_by_a_share_of_a_mean_axle_load_from_the_rear_to_the_front() -> None:
+    vehicle = Vehicle.from_dict(
+        {"mass": 900, "wheelbase": 2.7, "center_of_gravity_height": 0.8, "wheel": {"radius": 0.5, "inertia": 5},
+         "axles": {"front": {"mass": 300, "wheels": ["fl", "fr"]}, "rear": {"mass": 600, "wheels": ["rl", "rr"]}}}
+    )  # fmt: skip
+    load = np.array([1400.0, 1600.0, 2500.0, 3500.0])
+    moved = gains._shifted(load, vehicle, 0.05) * load
+    np.testing.assert_allclose(moved[:2].sum(), 0.05 * 9000 / 2)
+    np.testing.assert_allclose(moved[2:].sum(), -0.05 * 9000 / 2)
