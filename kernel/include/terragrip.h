@@ -388,6 +388,7 @@ typedef struct {
     tg_real center_of_gravity_height; /* m */
     tg_real hitch_height;           /* m */
     tg_real rolling_radius[8];      /* wheel, m: travel per radian; machine.radius is the torque arm */
+    tg_real drive_friction[8];      /* wheel, N m: of motor and gears, part of the measured torque, against the wheel's turning */
     tg_real offset[36], gain[36];   /* calibration: value = (raw - offset) / gain */
     tg_real noise[36];              /* SD of each channel after calibration */
     tg_real held_period[36];        /* s; > 0: the channel repeats its last value between updates this far apart */

@@ -29,7 +29,7 @@ const tgi_field tgi_settings_fields[] = {
     INSIDE(T, machine, tg_machine, machine), INSIDE(T, tuning, tg_tuning, tuning), REALS(T, load_share), REALS(T, load_transfer),
     REALS(T, payload_share), REALS(T, payload_height), REALS(T, hitch_share),
     REALS(T, wheel_share), REALS(T, wheel_side), REALS(T, wheel_ahead), REALS(T, receiver_ahead), REALS(T, receiver_side), REALS(T, lateral_share), REALS(T, center_of_gravity_height), REALS(T, hitch_height),
-    REALS(T, rolling_radius), REALS(T, offset), REALS(T, gain), REALS(T, noise), REALS(T, held_period), REALS(T, ground_speed_delay), REALS(T, uncertainty),
+    REALS(T, rolling_radius), REALS(T, drive_friction), REALS(T, offset), REALS(T, gain), REALS(T, noise), REALS(T, held_period), REALS(T, ground_speed_delay), REALS(T, uncertainty),
     REALS(T, prior_adhesion), REALS(T, prior_adhesion_std), REALS(T, prior_resistance), REALS(T, prior_resistance_std), REALS(T, slope_spread),
     REALS(T, standstill_speed), REALS(T, dead_band), REALS(T, gap), REALS(T, max_step), REALS(T, outlier_weight), REALS(T, load_filter),
     REALS(T, algebraic_filter), REALS(T, watch), REALS(T, tuned), END};

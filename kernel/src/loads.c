@@ -102,18 +102,21 @@ static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_
         if (!measured[k]) load[k] += (rest - computed) * s->load_share[k] / share;
 }
 
-/* A tyre's own resistance opposes its wheel, which the model takes to turn with the travel: of one that turns against it, as on the inner
- * side of a turn on the spot, twice the resistance is added to the torque. */
-static void turn_tyres(const tg_estimator *e, tg_drive *drive)
+/* What opposes a wheel's own turning, and so is no part of the model: the friction of its drive, taken off the torque; and the tyre's
+ * resistance, which the model takes to oppose the travel: of a wheel that turns against that, as on the inner side of a turn on the spot,
+ * twice the resistance is added. */
+static void oppose_turning(const tg_estimator *e, tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const tg_real back = -d * s->rolling_radius[i] * e->settling[i].soon / s->standstill_speed;
-        if (!(back > 0)) continue;
-        const tg_real resistance = 2 * d * (back < 1 ? back : 1) * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];
-        drive->torque[i] += resistance;
-        drive->mean_torque[i] += resistance;
+        const tg_real turning = s->rolling_radius[i] * e->settling[i].soon / s->standstill_speed;
+        if (!(tgi_fabs(turning) > 0)) continue;
+        const tg_real way = turning < -1 ? -1 : turning > 1 ? 1 : turning;
+        tg_real less = s->drive_friction[i] * way;
+        if (d * way < 0) less += 2 * way * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];
+        drive->torque[i] -= less;
+        drive->mean_torque[i] -= less;
     }
 }
 
@@ -148,5 +151,5 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
         tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);
         drive->load[i] = wheel > least ? wheel : least;
     }
-    turn_tyres(e, drive);
+    oppose_turning(e, drive);
 }

@@ -25,6 +25,7 @@ from terragrip.vehicle_parts import (
     Bearing,
     Calibration,
     Driveline,
+    Friction,
     FuelPerEnergy,
     Height,
     Length,
@@ -68,6 +69,7 @@ class Vehicle(Part):
     wheel: Wheel | None = None
     tire_rolling_resistance: Annotated[float, *quantity_of("1", 0, 0.5, likely=("%",))] = 0.0
     bearing_resistance: Bearing = 0.0
+    drive_friction: Friction = 0.0
     articulated: bool = False
     antenna: Antenna | None = None
     radar: Radar | None = None
@@ -225,6 +227,13 @@ class Vehicle(Part):
         """Bearing resistance of each wheel (n,) [N s/rad]: its axle's, else the vehicle's."""
         own = [axle.bearing_resistance for axle in self.axles.values() for _ in axle.wheels]
         return _frozen(np.array([self.bearing_resistance if one is None else one for one in own]))
+
+    @cached_property
+    def wheel_friction(self) -> Floats:
+        """Friction of each wheel's drive (n,) [N m], of one size at any speed: its axle's, else the vehicle's; 0 of a free wheel."""
+        own = [axle.drive_friction for axle in self.axles.values() for _ in axle.wheels]
+        every = np.array([self.drive_friction if one is None else one for one in own])
+        return _frozen(np.where(self.driven, every, 0.0))
 
     @cached_property
     def driven(self) -> Bools:

@@ -61,6 +61,7 @@ _Inertia = Annotated[float, *quantity_of("kg m^2", 0, 1e4, above=True)]
 _Pressure = Annotated[float, *quantity_of("Pa", 1e3, 2e6, likely=("kPa", "bar"))]
 _Ratio = Annotated[float, *quantity_of("1", 0, 1, likely=("%",))]
 Bearing = Annotated[float, *quantity_of("N s/rad", 0, 1e5)]
+Friction = Annotated[float, *quantity_of("N m", 0, 1e6)]
 _Angle = Annotated[float, *quantity_of("rad", 0, 1.5, likely=("deg",))]
 _SignedAngle = Annotated[float, *quantity_of("rad", -1.5, 1.5, likely=("deg",))]
 _SpeedSD = Annotated[float, *quantity_of("m/s", 0, 100, above=True)]
@@ -158,7 +159,7 @@ class Wheel(Part):
 class Axle(Part):
     """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers.
 
-    ``bearing_resistance`` [N s/rad]: of each of its wheels, where it is another than the vehicle's.
+    ``bearing_resistance`` [N s/rad] and ``drive_friction`` [N m]: of each of its wheels, where they are others than the vehicle's.
     """
 
     mass: Mass
@@ -167,6 +168,7 @@ class Axle(Part):
     driven: bool = True
     steered: bool = False
     bearing_resistance: Bearing | None = None
+    drive_friction: Friction | None = None
 
     @field_validator("wheels", mode="before")
     @classmethod

@@ -166,6 +166,7 @@ def test_driven_wheels_become_one_where_their_masses_have_their_mean() -> None:
     line = {
         "driveline": {"efficiency": 0.8, "efficiency_std": 0.04, "accessory_power": 0},
         "bearing_resistance": 3.0,
+        "drive_friction": 40.0,
         "hitch_overhang": 1.0,
     }
     vehicle = tractor(
@@ -179,6 +180,7 @@ def test_driven_wheels_become_one_where_their_masses_have_their_mean() -> None:
             "wheel": {"radius": 0.5, "inertia": 20.0},
             "driven": False,
             "bearing_resistance": 6.0,
+            "drive_friction": 0.0,
         },
         "driven": {
             "mass": 3500.0,
@@ -186,6 +188,7 @@ def test_driven_wheels_become_one_where_their_masses_have_their_mean() -> None:
             "wheel": {"radius": 0.8, "inertia": 100.0},
             "driven": True,
             "bearing_resistance": 6.0,
+            "drive_friction": 80.0,
         },
     }
     assert (data["wheelbase"], data["hitch_overhang"]) == (pytest.approx(2.8), 1.0)

@@ -30,6 +30,13 @@ def test_an_exact_sensor_reads_the_truth(quiet):
         np.testing.assert_allclose(result.recording[name], result.truth[truth], atol=1e-9)
 
 
+def test_a_torque_by_the_motor_holds_the_drives_friction(quiet):
+    plain, own = simulate(quiet(**STEADY)), quiet(**STEADY)
+    geared = own.model_copy(update={"vehicle": own.vehicle | {"drive_friction": 1.5}})
+    more = simulate(geared).recording["drive_torque_fl"] - plain.recording["drive_torque_fl"]
+    np.testing.assert_allclose(more[plain.recording.time > 8], 1.5, atol=1e-9)
+
+
 def test_noise_offset_gain(quiet):
     result = sensed(quiet, ground_speed={"rate": 100, "noise": 0.02, "offset": 0.1, "gain": 1.05})
     _, values = samples(result, "ground_speed")

@@ -258,6 +258,7 @@ def lumped(vehicle: Vehicle, zero: tuple[float, float] | None) -> dict[str, Any]
         wheel = {"radius": radius, "inertia": inertia}
         axle = {"mass": float(mass[axles].sum()), "wheels": [name], "wheel": wheel, "driven": chosen}
         axle["bearing_resistance"] = float(vehicle.wheel_bearing[wheels].sum())
+        axle["drive_friction"] = float(vehicle.wheel_friction[wheels].sum())
         groups.append((place, name, axle))
     groups.sort(key=lambda group: -group[0])
     rear = groups[-1][0]

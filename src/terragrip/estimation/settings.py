@@ -131,6 +131,7 @@ def _set_wheels(settings: Any, vehicle: Vehicle, channels: Collection[str]) -> N
     for i, wheel in enumerate(vehicle.wheels):
         machine.radius[i] = arms[i]
         settings.rolling_radius[i] = rolling[i]
+        settings.drive_friction[i] = vehicle.wheel_friction[i]
         machine.inertia[i] = vehicle.wheel_inertia[i]
         machine.bearing_resistance[i] = vehicle.wheel_bearing[i]
         settings.wheel_axle[i] = vehicle.wheel_axle[i]

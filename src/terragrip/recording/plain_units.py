@@ -30,6 +30,7 @@ _BOUNDS = (
     ("mass", "kg", "volume", (0.3, 3000.0), ("t", "g")),
     ("wheel.inertia", "kg m^2", "inertia", (1e-3, 20.0), ()),
     ("bearing_resistance", "N s/rad", "drag", (0.0, 1.0), ()),
+    ("drive_friction", "N m", "torque", (0.0, 0.5), ("kN m",)),
     ("power", "W", "mass", (0.05, 1000.0), ("kW",)),
     ("driveline.accessory_power", "W", "mass", (0.01, 100.0), ("kW",)),
     ("driveline.accessory_power_std", "W", "mass", (0.003, 100.0), ("kW",)),

@@ -41,6 +41,8 @@ def signals(sensor: str, trace: Trace) -> dict[str, Floats]:
     pitch, turn = trace["body_pitch"], trace["curvature"] * trace["speed"]
     if sensor in ("wheel_speed", "drive_torque"):
         column = trace["wheel_speed" if sensor == "wheel_speed" else "torque"]
+        if sensor == "drive_torque":  # with what motor and gears lose
+            column = column + trace.vehicle.wheel_friction * np.sign(trace["wheel_speed"])
         return {f"{sensor}_{wheel}": column[:, i] for i, wheel in enumerate(wheels)}
     if sensor == "ground_speed":
         return {sensor: trace["speed"]}

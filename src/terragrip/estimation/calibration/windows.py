@@ -111,7 +111,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     wheel_acceleration = _rate(wheel_speed, length)
     travelled = np.cumsum(np.nan_to_num(np.abs(speed))) * length
     behind = (vehicle.axle_to_rear[0] - vehicle.axle_to_rear)[vehicle.wheel_axle]
-    torque = per_wheel("drive_torque")
+    torque = per_wheel("drive_torque") - vehicle.wheel_friction * np.sign(wheel_speed)
     torque[:, ~vehicle.driven] = np.nan_to_num(torque[:, ~vehicle.driven])
     spin = np.nansum(vehicle.wheel_inertia * wheel_acceleration, axis=1)
     load = wheel_loads(
