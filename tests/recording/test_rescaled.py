@@ -46,6 +46,17 @@ def test_slip_that_grows_on_one_side_within_seconds_is_no_scale(columns: Columns
     assert not any("its scale changed" in note for note in notes(sound, tracked))
 
 
+def test_torques_that_ripple_by_lugs_while_load_moves_to_a_side_have_no_other_scale(
+    columns: Columns, tracked: Vehicle
+) -> None:
+    """A rover that creeps onto a side slope: for 10 s load leaves the wheels of one side, each of whose lugs is seen in its torque."""
+    time = columns["time"]
+    for part in range(8):
+        aside, lug = 1 - 0.35 * np.clip((time - 25) / 10, 0, 1), 1 + 0.3 * np.sin(4.5 * time + part)
+        rippling = straight(columns) | {"drive_torque_rr": aside * lug * columns["drive_torque_rr"]}
+        assert not any("its scale changed" in note for note in notes(rippling, tracked))
+
+
 def test_the_torques_of_a_bend_that_only_the_rims_show_have_no_other_scale(
     columns: Columns, tracked: Vehicle
 ) -> None:

@@ -19,6 +19,7 @@ _GAP, _APART = 1.0, 3.0  # s, and times the usual distance of samples
 _LOOKS = 8
 _FEW = 4000  # rows that show how far rows are apart
 _STAYS = 3.0  # times what it changes from half to half of either side
+_ALONE = 4.0  # standard deviations of what means of a moment differ by
 
 
 def longest(time: Floats, rows: Bools, known: Bools) -> tuple[float, float] | None:
@@ -83,7 +84,8 @@ def instant_of(
     time: Floats, values: Floats, size: float, *, gap: float, span: float, share: float
 ) -> float | None:
     """When values (n,), NaN where unknown, step at once by about ``size``: where the means of ``span`` [s] before and after differ most
-    in its way, ``gap`` [s] left out on both sides. None where that is not between ``share`` and 1/share of it."""
+    in its way, ``gap`` [s] left out on both sides. None where that is not between ``share`` and 1/share of it, or not beyond what such
+    means usually differ by there, as those of torques do that ripple lug by lug."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     if len(time) < 3:
@@ -100,5 +102,9 @@ def instant_of(
         )
 
     steps = np.nan_to_num(mean(gap) - mean(-gap - span)) * np.sign(size)
-    k = int(np.argmax(steps))
-    return float(middle[k]) if share < steps[k] / abs(size) < 1 / share else None
+    k, usual = int(np.argmax(steps)), MAD_TO_SD * median(np.abs(steps))
+    return (
+        float(middle[k])
+        if max(share, _ALONE * usual / abs(size)) < steps[k] / abs(size) < 1 / share
+        else None
+    )
