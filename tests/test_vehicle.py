@@ -69,6 +69,47 @@ def test_arrays_follow_the_wheels(tmp_path: Path) -> None:
         vehicle.wheel_radius[0] = 1.0
 
 
+FORWARDER = """\
+mass: 16 t
+wheelbase: 5 m
+center_of_gravity_height: 1.2 m
+payload: {x: 0.5 m, z: 1.9 m}
+axles:
+  front1: {mass: 5 t, wheels: [a, b], x: 5 m}
+  front2: {mass: 5 t, wheels: [c, d], x: 500 cm}
+  rear1: {mass: 3 t, wheels: [e, f], x: 0}
+  rear2: {mass: 3 t, wheels: [g, h]}
+wheel: {radius: 0.65 m, inertia: 90 kg m^2}
+"""
+
+
+def test_axles_of_a_bogie_share_what_its_pivot_carries(tmp_path: Path) -> None:
+    vehicle = load(tmp_path, FORWARDER)
+    np.testing.assert_allclose(vehicle.axle_to_rear, [5, 5, 0, 0])
+    # a tenth of the timber is on the front pivot, and a pull lifts that as if there were two axles
+    np.testing.assert_allclose(vehicle.payload_share, [0.05, 0.05, 0.45, 0.45])
+    lifted = 16e3 * 1.0 * 1.2 / 5 / 2
+    change = vehicle.axle_loads(acceleration=1.0) - vehicle.axle_loads()
+    np.testing.assert_allclose(change, [-lifted, -lifted, lifted, lifted])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "wrong"),
+    [
+        (", x: 500 cm", "", ("axles.front2.x", "is missing")),
+        ("x: 5 m}", "x: 6.5 m}", ("axles.front1.x", "is 6.5 m; the first axle is the wheelbase, 5 m")),
+        ("wheels: [g, h]", "wheels: [g, h], x: 0.2 m", ("axles.rear2.x", "is 0.2 m")),
+        ("x: 500 cm", "x: 6 m", ("axles.front2.x", "is ahead of the axle before it")),
+    ],
+)
+def test_places_of_axles_that_cannot_be_are_refused(
+    tmp_path: Path, old: str, new: str, wrong: tuple[str, str]
+) -> None:
+    with pytest.raises(InputError) as refused:
+        load(tmp_path, FORWARDER.replace(old, new, 1))
+    assert all(part in str(refused.value) for part in wrong)
+
+
 def test_one_axle_needs_no_wheelbase() -> None:
     vehicle = Vehicle.from_dict(
         {

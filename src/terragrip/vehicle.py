@@ -165,6 +165,25 @@ class Vehicle(Part):
         for key in ("wheelbase", "center_of_gravity_height") if len(self.axles) > 1 else ():
             if getattr(self, key) is None or key not in self.model_fields_set:
                 raise Fault("is missing", f"two or more axles need it: add e.g. '{key}: 0.6 m'", (key,))
+        placed = [name for name, axle in self.axles.items() if axle.x is not None]
+        if placed:
+            self._check_places(placed)
+
+    def _check_places(self, placed: list[str]) -> None:
+        """Places of axles: those between the first and the last have all one or none, and none is ahead of one before it."""
+        between = list(self.axles)[1:-1]
+        missing = next((name for name in between if name not in placed), None)
+        if missing is not None:
+            hint = "give it for every axle between the first and the last, or for none: then they are evenly spaced"
+            raise Fault("is missing", hint, ("axles", missing, "x"))
+        place, length = self.axle_to_rear, self.wheelbase or 0.0
+        for k, name, right in ((0, next(iter(self.axles)), length), (-1, list(self.axles)[-1], 0.0)):
+            if abs(place[k] - right) > 1e-6:
+                hint = f"the first axle is the wheelbase, {length:g} m, ahead of the last, and that is at 0: leave x out there"
+                raise Fault(f"is {place[k]:g} m", hint, ("axles", name, "x"))
+        if np.any(np.diff(place) > 0):
+            name = list(self.axles)[int(np.argmax(np.diff(place) > 0)) + 1]
+            raise Fault("is ahead of the axle before it", "list axles front to rear", ("axles", name, "x"))
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:
@@ -252,9 +271,11 @@ class Vehicle(Part):
 
     @cached_property
     def axle_to_rear(self) -> Floats:
-        """Distance of each axle to the rear one (axles,) [m]; axles are assumed evenly spaced."""
+        """Distance of each axle to the rear one (axles,) [m]: its ``x``; without any, axles are evenly spaced."""
         count = len(self.axles)
-        return _frozen(np.linspace(self.wheelbase or 0.0, 0.0, count) if count > 1 else np.zeros(1))
+        even = np.linspace(self.wheelbase or 0.0, 0.0, count) if count > 1 else np.zeros(1)
+        own = [axle.x for axle in self.axles.values()]
+        return _frozen(np.array([e if x is None else x for e, x in zip(even, own, strict=True)]))
 
     @cached_property
     def wheel_side(self) -> Floats:

@@ -159,6 +159,7 @@ class Wheel(Part):
 class Axle(Part):
     """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers.
 
+    ``x`` [m]: how far ahead of the last axle its load acts; of a bogie's two axles where that is pivoted.
     ``bearing_resistance`` [N s/rad] and ``drive_friction`` [N m]: of each of its wheels, where they are others than the vehicle's.
     """
 
@@ -167,6 +168,7 @@ class Axle(Part):
     wheel: Wheel | None = None
     driven: bool = True
     steered: bool = False
+    x: Annotated[float, *quantity_of("m", 0, 30, likely=("mm", "cm"))] | None = None
     bearing_resistance: Bearing | None = None
     drive_friction: Friction | None = None
 

@@ -44,7 +44,8 @@ def axle_loads(
     Parameters
     ----------
     axle_mass: (axles,) kg, weighed on each axle of the level, standing, uncoupled vehicle, front to rear.
-    axle_position: (axles,) m ahead of the rear axle, which is 0; strictly falling.
+    axle_position: (axles,) m ahead of the rear axle, which is 0; none rises. The two of a bogie, which shares its load evenly: that
+        of its pivot.
     center_of_gravity_height, hitch_height: h and h_d, m above ground. hitch_overhang: c, m behind the rear
         axle.
     drawbar: F_dx, N, backward pull positive. hitch_load: F_dz, N, downwards positive.
@@ -58,7 +59,7 @@ def axle_loads(
 
     Raises
     ------
-    ValueError: masses and positions differ in number, a mass is not positive, or positions do not fall to 0.
+    ValueError: masses and positions differ in number, a mass is not positive, or positions rise or do not end at 0.
     """
     mass = np.asarray(axle_mass)
     position = np.asarray(axle_position)
@@ -66,7 +67,7 @@ def axle_loads(
         raise ValueError(f"one mass and one position an axle, got shapes {mass.shape} and {position.shape}")
     if not np.all(mass > 0):
         raise ValueError(f"axle masses must be positive, got {mass}")
-    if position[-1] != 0 or not np.all(np.diff(position) < 0):
+    if position[-1] != 0 or not np.all(np.diff(position) <= 0) or (position.size > 1 and position[0] == 0):
         raise ValueError(f"axle positions must fall from front to rear and end at 0, got {position}")
 
     drawbar, hitch_load, acceleration, slope, spin_torque = (
