@@ -53,3 +53,18 @@ def test_a_curve_that_cannot_follow_is_the_nearest() -> None:
     model = CURVES["brixius"]
     after = moved(model, start("brixius"), Handle("level", 0.6, 2.0))
     assert float(model.value(0.6, after)) == pytest.approx(0.88 * (1 - np.exp(-4.5)), abs=0.005)
+
+
+@pytest.mark.parametrize("name", [name for name in CURVES if name != "brixius"])
+def test_a_rise_that_is_dragged_past_an_axis_or_the_peak_keeps_its_way_and_the_curves_height(
+    name: str,
+) -> None:
+    model, before = CURVES[name], start(name)
+    rise = next(one for one in handles(model, before) if one.name == "rise")
+    height = np.max(model.value(np.linspace(0, 0.6, 301), before))
+    for slip in (-0.3, 0.0, 0.4, 0.5, 1.0):
+        after = moved(model, before, Handle("rise", slip, rise.value))
+        found = next(one for one in handles(model, after) if one.name == "rise")
+        assert (found.slip - rise.slip) * (slip - rise.slip) > 0, slip
+        if name != "wismer_luth" or slip < rise.slip:  # its one parameter flattens the whole curve
+            assert np.max(model.value(np.linspace(0, 0.6, 301), after)) > 0.8 * height, slip

@@ -218,3 +218,19 @@ def test_a_librarys_curve_comes_with_what_its_fit_left_open_and_keeps_it_when_sa
     saved = json.loads((folder / "other.json").read_text())["soils"][name]
     for key in ("parameters", "interval", "identifiability", "notes"):
         assert saved[key] == soil[key]
+
+
+def test_all_shows_the_whole_of_a_curve_above_the_points(page: Any, served: Served) -> None:
+    """The paper's curve over the points of a soft soil left the plot at the top."""
+    page.goto(f"{served.url}/#/fit?path=soils.json")
+    page.wait_for_selector("#soil-list li")
+    page.get_by_label("Add a curve from the literature").select_option(index=1)
+    page.wait_for_function("""() => {
+        const { state, plot } = window.terragripFit;
+        const { x, y } = plot.view;
+        const tops = state.kept.curves.map((curve) => {
+            const { slip, value } = state.samples.of(curve.id, curve) ?? { slip: [], value: [] };
+            return Math.max(...value.filter((v, i) => slip[i] >= 0 && slip[i] <= x.high));
+        });
+        return tops.length > 2 && tops.every((top) => top > 0 && top < y.high);
+    }""")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served
+from served import NEEDS, Served, until
 from terragrip.physics.adhesion import CURVES
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
@@ -78,3 +78,45 @@ def test_a_handle_is_moved_by_keys_and_a_held_parameter_stays(fitted: Any) -> No
     for name in before:
         fitted.check(f"#hold-{name}")
     fitted.wait_for_function("() => !document.querySelector('.handle')")
+
+
+def test_a_drag_past_the_axes_stops_there_and_outlasts_a_handle_that_comes_back(fitted: Any) -> None:
+    box = fitted.locator("#handle-peak").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    end = fitted.evaluate("() => window.terragripFit.plot.view.x.high")
+    level = fitted.locator("#handle-level").bounding_box()["x"]
+
+    def peak() -> float:
+        return float(CURVES["burckhardt"].peak(fitted.evaluate(PARAMETERS))[0])
+
+    before = peak()
+    fitted.mouse.move(x, y)
+    fitted.mouse.down()
+    fitted.mouse.move(x + 3000, y)
+    until(lambda: abs(peak() - end) < 0.01)
+    fitted.mouse.move(level, y)
+    fitted.wait_for_selector("#handle-level", state="detached")  # the peak lies beside it
+    fitted.mouse.move(x + 20, y)
+    fitted.wait_for_selector("#handle-level")
+    fitted.mouse.move(x, y)
+    until(lambda: abs(peak() - before) < 0.01)
+    fitted.mouse.up()
+
+
+def test_two_fingers_zoom_the_plot(fitted: Any) -> None:
+    before = fitted.evaluate("() => window.terragripFit.plot.view.x")
+    plot = fitted.locator(".plot").bounding_box()
+    touch = fitted.context.new_cdp_session(fitted)
+    middle, y = plot["x"] + 300, plot["y"] + 300
+
+    def fingers(kind: str, *places: float) -> None:
+        points = [{"x": x, "y": y, "id": i} for i, x in enumerate(places)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    fingers("touchStart", middle - 50)
+    fingers("touchStart", middle - 50, middle + 50)
+    fingers("touchMove", middle - 100, middle + 50)
+    fingers("touchMove", middle - 100, middle + 100)
+    fingers("touchEnd")
+    after = fitted.evaluate("() => window.terragripFit.plot.view.x")
+    assert after["high"] - after["low"] == pytest.approx((before["high"] - before["low"]) / 2, rel=0.02)

@@ -69,3 +69,40 @@ def test_no_control_hides_below_the_cab_page(page: Any, served: Served) -> None:
     for _ in range(12):
         page.keyboard.press("Tab")
         assert page.evaluate(inside)
+
+
+def test_a_link_to_another_page_leads_to_its_heading(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/start")
+    page.focus("a >> text=estimates.parquet")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(".charts[data-rows]")
+    assert page.evaluate(FOCUSED) == "Drive"
+    page.keyboard.press("Tab")
+    assert page.evaluate("() => document.activeElement.id") == "run"
+
+
+def test_a_menu_folds_in_when_the_focus_leaves_it(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/drive?path=estimates.parquet")
+    page.wait_for_selector(".charts[data-rows]")
+    page.focus("summary >> text=Panels")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    assert page.locator("details.chooser[open]").count() == 1
+    page.get_by_label("Soil resistance").first.focus()
+    page.keyboard.press("Space")  # the boxes are drawn anew
+    page.wait_for_selector(".charts h2:has-text('Soil resistance')", state="detached")
+    assert page.evaluate("() => document.activeElement.labels[0].textContent").startswith("Soil resistance")
+    assert page.locator("details.chooser[open]").count() == 1
+    page.locator("details.chooser[open] .check").first.hover()
+    page.mouse.down()  # on a label, as slowly as by hand
+    assert page.locator("details.chooser[open]").count() == 1
+    page.mouse.up()
+    page.focus("#run")
+    assert page.locator("details.chooser[open]").count() == 0
+
+
+def test_the_dialog_of_a_command_and_its_fields_have_names(page: Any, served: Served) -> None:
+    page.goto(f"{served.url}/#/start")
+    page.click("button >> text=Report")
+    assert page.get_by_role("dialog", name="Write a report: estimates.parquet").is_visible()
+    assert page.get_by_label("Title").input_value() == "Traction report"

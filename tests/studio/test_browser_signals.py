@@ -287,7 +287,9 @@ def test_the_keyboard_lays_a_run_over_and_makes_a_formula(page: Any, served: Ser
     page.keyboard.press("Tab")
     page.keyboard.press("Space")
     page.wait_for_function("() => document.querySelectorAll('.legend-row .run').length === 2")
-    assert page.evaluate("() => document.activeElement.name") == "overlay late.parquet"  # not the body
+    assert (
+        page.evaluate("() => document.activeElement.labels[0].textContent") == "late.parquet"
+    )  # not the body
     page.focus("#formulas summary")
     page.keyboard.press("Enter")
     page.keyboard.press("Tab")

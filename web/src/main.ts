@@ -1,7 +1,7 @@
 import { Notices, SILENT } from "./ui/api";
 import { foldChoosers } from "./ui/choosers";
 import { fill, h } from "./ui/dom";
-import { keepFocus } from "./ui/focus";
+import { focusOn, keepFocus } from "./ui/focus";
 import { SHOWN, withdraw } from "./ui/notes";
 import { startTheme, switchTheme } from "./ui/theme";
 import { startUnits, unitsChooser } from "./ui/units";
@@ -41,10 +41,13 @@ async function open(): Promise<void> {
   unloaded = page === missing;
   leave?.();
   withdraw(undefined, SHOWN);
+  const focused = document.activeElement?.id ?? "";
   main.className = `page-${unloaded ? "start" : name}`;
   fill(main);
   leave = page(main, { notices, query });
   if (!main.querySelector("h1")) main.prepend(h("h1", { class: "visually-hidden" }, chosen.title));
+  // Of a page that was gone to from another, a control that both have, or its heading: who reads by ear hears which page it is.
+  if (turn > 1 && document.activeElement === document.body) focusOn(document.getElementById(focused) ?? main.querySelector("h1"));
 }
 
 /** In place of a page that could not be loaded: no studio answers, or one of another version, which has other files. */

@@ -22,6 +22,8 @@ FAR = 0.60
 _GRID = np.linspace(0.0, FAR, 301)
 _INSIDE = (0.02, 0.95)
 """Slips between which a largest value is a peak, and may be dragged."""
+_RISES = (0.01, 0.45 * FAR)
+"""Slips that a rise may be dragged to; at half of the level's even a straight line has risen by half."""
 _FALL = 0.02
 """Share of its height that a curve falls by after its peak; one that falls less is level."""
 _OTHERS, _SAME = 1e-2, 1e-3
@@ -64,7 +66,7 @@ def handles(
     half = _half(model, parameters)
     found = [Handle("zero", 0.0, float(zero))] if INTERCEPT in free or model.native_intercept else []
     steep = any(
-        abs(_half(model, {**parameters, name: 0.9 * parameters[name] - 0.01}) - half) > 1e-4 for name in own
+        abs(_half(model, {**parameters, name: 1.1 * parameters[name] + 0.01}) - half) > 1e-4 for name in own
     )
     if steep:
         found.append(Handle("rise", half, float(_values(model, parameters, np.array([half]))[0])))
@@ -162,7 +164,7 @@ def _goal(handle: Handle) -> Handle:
     if handle.name == "level":
         return replace(handle, slip=FAR)
     if handle.name == "rise":
-        return replace(handle, slip=float(np.clip(handle.slip, 0.003, 0.9 * FAR)))
+        return replace(handle, slip=float(np.clip(handle.slip, *_RISES)))
     return replace(handle, slip=float(np.clip(handle.slip, *_INSIDE)))
 
 
@@ -190,14 +192,14 @@ def _half(model: CurveModel, parameters: Mapping[str, float]) -> float:
 
 
 def _miss(model: CurveModel, parameters: Mapping[str, float], handle: Handle) -> Floats:
-    """How far a curve passes by a handle [-], "rise" by half of its height; a peak's slope too, over the way to it."""
+    """How far a curve passes by a handle [-], "rise" by the ratio of slips, the others in value; a peak's slope too, over the way to it."""
     if handle.name == "height":
         return np.array([_height(model, parameters) - handle.value])
+    # A rise by its slip: by its value, a flat curve and one that falls through half of its height would pass too.
+    if handle.name == "rise":
+        return np.log([max(_half(model, parameters), 1e-4) / handle.slip])
     slip = np.array([handle.slip])
     at = _values(model, parameters, slip)
-    if handle.name == "rise":
-        zero = _values(model, parameters, np.zeros(1))
-        return at - 0.5 * (zero + _height(model, parameters))
     if handle.name == "peak":
         return np.concatenate([at - handle.value, slip * model.slope(slip, _own(parameters))])
     return at - handle.value

@@ -61,7 +61,7 @@ export function overlayChooser(choose: (paths: string[]) => Promise<void>): { el
         fill(
           menu,
           others.map((path) => {
-            const box = h("input", { type: "checkbox", name: `overlay ${path}`, checked: ticked.has(path), disabled: !ticked.has(path) && ticked.size >= OTHERS });
+            const box = h("input", { type: "checkbox", checked: ticked.has(path), disabled: !ticked.has(path) && ticked.size >= OTHERS });
             box.addEventListener("change", () => void tick(path, box.checked));
             return h("label", { class: "check" }, box, path);
           }),

@@ -1,7 +1,7 @@
 /** Handles on the active curve, dragged by mouse, finger or arrow keys. The server says where they lie, and the curve that a moved one gives. */
 
 import { send } from "../ui/api";
-import { digits, fill, h } from "../ui/dom";
+import { digits, h } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { unitFor, withUnit } from "../ui/units";
 import type { View } from "../ui/view";
@@ -62,8 +62,13 @@ export class Handles {
 
   /** A handle's place on the screen; of one above or below what is shown, at the edge, so that the curve can be fetched back. */
   private spot({ slip, value }: Handle): [number, number] {
-    const { y, height } = this.view.box;
-    return [this.view.px(slip), Math.min(Math.max(this.view.py(value), y), y + height)];
+    return this.within(this.view.px(slip), this.view.py(value));
+  }
+
+  /** A place on the screen, or the nearest inside the axes. */
+  private within(px: number, py: number): [number, number] {
+    const { x, y, width, height } = this.view.box;
+    return [Math.min(Math.max(px, x), x + width), Math.min(Math.max(py, y), y + height)];
   }
 
   private drop(name: string, button: HTMLElement): void {
@@ -88,15 +93,16 @@ export class Handles {
     });
     button.addEventListener("pointermove", (event) => {
       if (!this.drag || this.drag.over || !button.hasPointerCapture(event.pointerId)) return;
-      const [x, y] = [event.clientX - this.drag.off[0], event.clientY - this.drag.off[1]];
+      const [x, y] = this.within(event.clientX - this.drag.off[0], event.clientY - this.drag.off[1]);
       void this.lead(this.drag, [this.view.x_of(x), this.view.y_of(y)]);
     });
     for (const kind of ["pointerup", "pointercancel", "keyup", "blur"] as const) button.addEventListener(kind, () => this.end());
     button.addEventListener("dblclick", (event) => event.stopPropagation());
     button.addEventListener("keydown", (event) => this.key(name, event));
     this.buttons.set(name, button);
-    const order = Object.keys(NAMES);
-    fill(this.element, [...this.buttons].sort(([a], [b]) => order.indexOf(a) - order.indexOf(b)).map(([, one]) => one));
+    const names = Object.keys(NAMES);
+    const next = names.slice(names.indexOf(name) + 1).map((other) => this.buttons.get(other)).find((one) => one);
+    this.element.insertBefore(button, next ?? null); // the others stay where they are: one of them may be dragged
     return button;
   }
 

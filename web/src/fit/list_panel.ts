@@ -130,6 +130,7 @@ export class ListPanel {
       this.state.addCurve(soil.model, soil.parameters, soil.name, soil.source);
       this.state.commit();
       this.state.changed("all");
+      this.shown();
     });
     return choice;
   }

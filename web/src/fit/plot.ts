@@ -23,6 +23,8 @@ export class Plot {
   private layers: HTMLCanvasElement[];
   private stale = new Set<number>([0, 1, 2]);
   private asked = false;
+  /** Curves were not known yet when all was to be shown. */
+  private unsized = false;
   private readout = h("output", { class: "readout", "aria-hidden": "true" });
   /** A line for the page: how well the active curve goes through the data. */
   readonly quality = h("p", { class: "quality", id: "quality" });
@@ -59,7 +61,7 @@ export class Plot {
     requestAnimationFrame(() => this.draw());
   }
 
-  /** Show all points and marked axes, or the usual window where there are none. */
+  /** Show all points, curves and marked axes, or the usual window where there are none. */
   fit(): void {
     const soils = this.state.soils.filter((soil) => soil.shown);
     const pictures = Object.values(this.state.kept.pictures).filter((picture) => picture.shown);
@@ -68,7 +70,12 @@ export class Plot {
     const ys = [...soils.flatMap((s) => [...s.points.adhesion, ...s.bins.map((b) => b.mean + b.std)]), ...marks("adhesion")];
     const most = (values: number[], share: number): number => [...values].sort((a, b) => a - b)[Math.floor(values.length * share)] ?? 0;
     this.view.x = { low: Math.min(0, most(xs, 0.002)), high: Math.max(0.7, Math.min(most(xs, 0.998) * 1.05, 1)) };
-    this.view.y = { low: Math.min(0, most(ys, 0.002)), high: ys.length ? Math.max(0.1, most(ys, 0.998) * 1.12) : 0.8 };
+    const curves = this.state.kept.curves.filter((curve) => curve.shown);
+    const drawn = curves.map((curve) => this.state.samples.of(curve.id, curve));
+    this.unsized = !curves.every((curve) => this.state.samples.isCurrent(curve.id, curve));
+    const { low, high } = this.view.x;
+    const values = drawn.flatMap((samples) => samples?.value.filter((_, i) => (samples.slip[i] ?? NaN) >= low && (samples.slip[i] ?? NaN) <= high) ?? []).filter((value) => value !== null);
+    this.view.y = { low: Math.min(0, most(ys, 0.002), ...values), high: Math.max(ys.length ? Math.max(0.1, most(ys, 0.998) * 1.12) : 0.8, 1.05 * Math.max(0, ...values)) };
     this.redraw("view");
   }
 
@@ -87,6 +94,7 @@ export class Plot {
 
   private draw(): void {
     this.asked = false;
+    if (this.unsized) this.fit();
     this.redraws++;
     const drawers = [this.drawPictures, this.drawData, this.drawCurves];
     if (this.stale.has(0)) this.onView?.();
@@ -190,31 +198,39 @@ export class Plot {
   }
 
   private listen(): void {
-    let drag: { x: number; y: number; moved: boolean } | null = null;
+    const held = new Map<number, Pixel>(); // where each pointer is that is down: one pans, two zoom too
+    let moved = false;
+    const middle = (all: Pixel[]): Pixel => [all.reduce((sum, [x]) => sum + x, 0) / all.length, all.reduce((sum, [, y]) => sum + y, 0) / all.length];
+    const apart = ([a, b]: Pixel[]): number => (a && b ? Math.max(Math.hypot(a[0] - b[0], a[1] - b[1]), 1) : 1);
     const at = (event: MouseEvent): Pixel => {
       const box = this.element.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
     };
     this.element.addEventListener("pointerdown", (event) => {
-      const [x, y] = at(event);
-      drag = { x, y, moved: false };
+      moved = held.size > 0;
+      held.set(event.pointerId, at(event));
       this.element.setPointerCapture(event.pointerId);
     });
     this.element.addEventListener("pointermove", (event) => {
       const [x, y] = at(event);
       const unit = unitFor("share");
       this.readout.value = this.view.inside(x, y) ? `s ${withUnit((this.view.x_of(x) * unit.scale).toFixed(unit.decimals + 1), unit)}   µ ${this.view.y_of(y).toFixed(3)}` : "";
-      if (!drag) return;
-      if (!drag.moved && Math.hypot(x - drag.x, y - drag.y) < 4) return;
-      this.view.pan(x - drag.x, y - drag.y);
-      drag = { x, y, moved: true };
+      const was = held.get(event.pointerId);
+      if (!was || (!moved && Math.hypot(x - was[0], y - was[1]) < 4)) return;
+      moved = true;
+      const before = [...held.values()];
+      held.set(event.pointerId, [x, y]);
+      const now = [...held.values()];
+      const [from, to] = [middle(before), middle(now)];
+      this.view.pan(to[0] - from[0], to[1] - from[1]);
+      this.view.zoom(apart(before) / apart(now), ...to);
       this.redraw("view");
     });
     this.element.addEventListener("pointerup", (event) => {
       const [x, y] = at(event);
-      if (drag && !drag.moved && this.view.inside(x, y)) this.onClick?.([this.view.x_of(x), this.view.y_of(y)], event.shiftKey);
-      drag = null;
+      if (held.delete(event.pointerId) && !moved && this.view.inside(x, y)) this.onClick?.([this.view.x_of(x), this.view.y_of(y)], event.shiftKey);
     });
+    this.element.addEventListener("pointercancel", (event) => held.delete(event.pointerId));
     this.element.addEventListener(
       "wheel",
       (event) => {

@@ -78,8 +78,8 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
   const go = h("button", { type: "submit", class: "primary", id: "job-go" }, "Start");
   const form = h(
     "form",
-    { method: "dialog", "aria-labelledby": "job-title" },
-    h("h2", { id: "job-title" }, `${command.title}: ${files.length === 1 ? files[0] : `${files.length} files`}`),
+    { method: "dialog" },
+    h("h2", { id: "job-heading" }, `${command.title}: ${files.length === 1 ? files[0] : `${files.length} files`}`),
     h("p", { class: "hint" }, command.about),
     files.length > 1 ? h("details", {}, h("summary", {}, "Which"), h("ul", {}, files.map((file) => h("li", {}, file)))) : null,
     command.asks.map((one) => forms[one]()),
@@ -104,6 +104,7 @@ export function ask(dialog: HTMLDialogElement, name: string, files: string[], it
       dialog.close();
     }, "job");
   });
+  dialog.setAttribute("aria-labelledby", "job-heading");
   fill(dialog, form);
   dialog.showModal();
 }

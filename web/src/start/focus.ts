@@ -1,6 +1,7 @@
 /** Focus that never falls to the body when a part of the page is redrawn. */
 
 import { fill } from "../ui/dom";
+import { focusOn } from "../ui/focus";
 
 type Children = Parameters<typeof fill>[1];
 
@@ -14,11 +15,4 @@ export function refill(parent: HTMLElement, children: Children): void {
   const same = key ? parent.querySelector<HTMLElement>(key) : null;
   if (same) same.focus({ preventScroll: true });
   else focusOn(parent.querySelector<HTMLElement>("h1, h2, h3") ?? document.querySelector<HTMLElement>("main"));
-}
-
-/** Focus what is not reached by Tab, such as a heading. */
-export function focusOn(element: HTMLElement | null): void {
-  if (!element) return;
-  if (!element.hasAttribute("tabindex")) element.tabIndex = -1;
-  element.focus({ preventScroll: true });
 }

@@ -4,7 +4,7 @@ import { get, isGoing, isOlder, send, type Item, type Job, type Notices } from "
 import { fill, h } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { onceReleased } from "../ui/press";
-import { focusOn } from "./focus";
+import { focusOn } from "../ui/focus";
 
 const SHOWN = 8;
 const NAMES: Record<string, string> = { estimate: "Estimate", batch: "Estimate", calibrate: "Calibrate", soils: "Learn soils", ground: "Ground", map: "Map", report: "Report" };

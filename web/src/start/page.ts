@@ -7,7 +7,7 @@ import { note, tried } from "../ui/notes";
 import { oneAtATime, type Context, type Page } from "../ui/page";
 import { onceReleased } from "../ui/press";
 import { ACTIONS, ask } from "./commands";
-import { focusOn, refill } from "./focus";
+import { refill } from "./focus";
 import { freeName, JobList, viewOf } from "./jobs";
 import { LogPage } from "./log";
 import { MachineMaker } from "./machine";
@@ -26,9 +26,7 @@ const KINDS: [string, string, string][] = [
 
 export const page: Page = (main, context) => {
   const log = context.query.get("log");
-  const leave = log ? openLog(main, context, log) : context.query.has("machine") ? openMaker(main) : openFolder(main, context);
-  if (document.activeElement === document.body) focusOn(main.querySelector("h1"));
-  return leave;
+  return log ? openLog(main, context, log) : context.query.has("machine") ? openMaker(main) : openFolder(main, context);
 };
 
 function openLog(main: HTMLElement, context: Context, log: string): () => void {

@@ -1,10 +1,14 @@
-/** Menus that fold out (`details.chooser`): a click elsewhere or Escape folds them in. */
+/** Menus that fold out (`details.chooser`): a click elsewhere, focus elsewhere or Escape folds them in. */
 
 const open = (): HTMLDetailsElement[] => [...document.querySelectorAll<HTMLDetailsElement>("details.chooser[open]")];
 
 export function foldChoosers(): void {
-  addEventListener("pointerdown", ({ target }) => {
-    for (const one of open()) if (!(target instanceof Node && one.contains(target))) one.open = false;
+  const foldBut = (place: EventTarget | null): void => {
+    for (const one of open()) if (!(place instanceof Node && one.contains(place))) one.open = false;
+  };
+  addEventListener("pointerdown", ({ target }) => foldBut(target));
+  addEventListener("focusin", ({ target }) => {
+    if (target !== document.getElementById("main")) foldBut(target); // a label that is pressed gives the focus to it for a moment
   });
   addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;

@@ -8,7 +8,7 @@ let place = 0;
 
 const usable = (element: HTMLElement): boolean => !element.matches(":disabled") && element.checkVisibility();
 const all = (): HTMLElement[] => [...document.querySelectorAll<HTMLElement>(FOCUSABLE)];
-const called = (element: HTMLElement): string => [element.tagName, element.getAttribute("aria-label") ?? (element instanceof HTMLInputElement ? element.name : element.textContent)].join("\0");
+const called = (element: HTMLElement): string => [element.tagName, element.getAttribute("aria-label") ?? (element instanceof HTMLInputElement ? element.labels?.[0]?.textContent : element.textContent)].join("\0");
 
 function restore(): void {
   const now = document.activeElement;
@@ -30,4 +30,11 @@ export function keepFocus(): void {
     if (target instanceof Element && !target.closest(FOCUSABLE)) last = null; // left on purpose
   });
   new MutationObserver(restore).observe(document.body, { subtree: true, childList: true, attributeFilter: ["disabled", "hidden"] });
+}
+
+/** Focus what is not reached by Tab, such as a heading. */
+export function focusOn(element: HTMLElement | null): void {
+  if (!element) return;
+  if (!element.hasAttribute("tabindex")) element.tabIndex = -1;
+  element.focus({ preventScroll: true });
 }
