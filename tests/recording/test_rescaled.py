@@ -57,6 +57,17 @@ def test_torques_that_ripple_by_lugs_while_load_moves_to_a_side_have_no_other_sc
         assert not any("its scale changed" in note for note in notes(rippling, tracked))
 
 
+@pytest.mark.parametrize(("half", "said"), [(4.0, True), (12.0, False)])
+def test_across_a_long_turn_loads_move_and_no_scale_is_named(
+    columns: Columns, tracked: Vehicle, half: float, said: bool
+) -> None:
+    """A rover that dug in and got out on other ground, or turned on a slope: where the torques leapt within that time shows nothing."""
+    sound = late(straight(columns), 0.7, "drive_torque_rr")
+    turning = np.abs(columns["time"] - 31.0) < half
+    sound["angular_velocity_z"] = np.where(turning, 0.8, sound["angular_velocity_z"])
+    assert any("its scale changed" in note for note in notes(sound, tracked)) == said
+
+
 def test_the_torques_of_a_bend_that_only_the_rims_show_have_no_other_scale(
     columns: Columns, tracked: Vehicle
 ) -> None:

@@ -29,6 +29,7 @@ _BEYOND_SPEED, _BEYOND_TORQUE = 4.0, 3.0  # standard deviations of a window
 _EVEN = 0.3  # of the pace: rims beyond spin, or stand
 _PULLING = 0.05  # of the axle's load
 _COARSEST = 0.5  # s between samples: further apart nothing shows that a scale changed at once, and not a soil
+_PAUSE = 20.0  # s between windows of like driving: over a longer one loads and ground change, too
 _GAP, _SPAN = 0.1, 0.5  # s, and one and three samples: between, a scale has changed
 _SHARE = 0.6  # of the step that is there at once
 
@@ -107,7 +108,9 @@ def _of_axle(
 
 
 def _instant(time: Floats, ratio: Floats, when: Floats, at: int, size: float) -> float | None:
-    """The instant of a step of a ``ratio`` (n,) near the one of windows whose middles are ``when``."""
+    """The instant of a step of a ``ratio`` (n,) near the one of windows whose middles are ``when``, None across a pause."""
+    if when[at] - when[at - 1] > _PAUSE:
+        return None
     first, last = when[max(at - 2, 0)] - WINDOW, when[min(at + 1, len(when) - 1)] + WINDOW
     rows = (time > first) & (time < last)
     spacing = median(np.diff(time[rows])) if rows.sum() > 2 else WINDOW
