@@ -62,13 +62,13 @@ def test_the_summary_of_an_estimate_names_pages(tmp_path: Path, capsys: pytest.C
     assert any("extra" in line and line.endswith("(docs: formats#in-a-profile)") for line in notes)
 
 
-def test_a_free_wheel_without_a_sensor_is_refused_with_the_way_out(tmp_path: Path) -> None:
+def test_a_driven_wheel_without_a_speed_is_refused_with_the_way_out(tmp_path: Path) -> None:
     machine = _tractor(tmp_path)
     time = np.arange(0.0, 5.0, 0.1)
-    channels = {f"{q}_{w}": np.ones(len(time)) for q in ("wheel_speed", "drive_torque") for w in ("rl", "rr")}
-    log = tg.Recording(time, channels | {"ground_speed": np.ones(len(time))})
+    names = ("wheel_speed_rl", "drive_torque_rl", "drive_torque_rr", "ground_speed")
+    log = tg.Recording(time, {name: np.ones(len(time)) for name in names})
     with pytest.raises(
-        tg.InputError, match=r"over the radius of this free wheel.*vehicle#signals-that-are-missing"
+        tg.InputError, match=r"wheel_speed_rr.*name them alike.*vehicle#signals-that-are-missing"
     ):
         tg.estimate(log, machine)
 

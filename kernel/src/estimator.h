@@ -150,6 +150,7 @@ struct tg_estimator {
     tg_hold wheel[8], ground;  /* speeds */
     tg_hold forward;           /* acceleration */
     int32_t sparse_wheels;
+    int32_t rolls;             /* bits: a free wheel whose speed was never measured, which goes as its hub does */
     int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c */
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     tg_real yaw_rate;
@@ -199,6 +200,7 @@ void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *dri
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
+TG_INLINE int32_t tgi_rolls(const tg_estimator *e, int32_t i) { return e->rolls >> i & 1; }
 int32_t tgi_is_recent(const tg_estimator *e, int32_t slot, double time);
 void tgi_track_turn(tg_estimator *e, const tg_row *row);
 int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);

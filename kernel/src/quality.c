@@ -42,6 +42,19 @@ static void move_to_middle(const tg_estimator *e, tg_row *row)
     row->turn_variance = tgi_square(by_yaw * s->noise[TG_YAW_RATE]) + tgi_square(s->noise[TG_GROUND_SPEED] * across / along);
 }
 
+/* A free wheel without a sensor turns as fast as its hub goes. */
+static void roll_along(tg_estimator *e, tg_row *row)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real seen = row->value[TG_YAW_RATE], yaw = !isnan(seen) ? seen : row->time - e->yaw_time > 1 ? 0 : e->yaw_rate;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        if (!isnan(row->value[TG_WHEEL_SPEED + i])) e->rolls &= ~(1 << i);
+        if (!tgi_rolls(e, i)) continue;
+        const tg_lanes along = lanes_all(row->value[TG_GROUND_SPEED] - s->wheel_side[i] * yaw), across = lanes_all(s->wheel_ahead[i] * yaw);
+        row->value[TG_WHEEL_SPEED + i] = tgi_hub_of(along, across)[0] / s->rolling_radius[i];
+    }
+}
+
 /* Calibrated row with NaN for whatever is no measurement. The estimator is changed only when all numbers are finite or NaN. */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 {
@@ -59,6 +72,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     row->time = sample->time;
     if (c->holds) drop_repetitions(e, sample, row);
     move_to_middle(e, row);
+    if (e->rolls) roll_along(e, row);
     for (int32_t k = TG_WHEEL_SPEED; k <= TG_GROUND_SPEED; k++) measured |= row->value[k] == row->value[k];
     row->outlier = outlier;
     row->measured = measured;
@@ -121,7 +135,7 @@ static tg_real turn_of_rims(const tg_estimator *e, double time)
     for (int32_t k = 0; k < s->axles; k++) {
         tg_real count = 0, side = 0, rim = 0, squares = 0, products = 0;
         for (int32_t i = 0; i < s->machine.wheels; i++) {
-            if (s->wheel_axle[i] != k || !tgi_is_recent(e, i, time)) continue;
+            if (s->wheel_axle[i] != k || tgi_rolls(e, i) || !tgi_is_recent(e, i, time)) continue;
             const tg_real speed = s->rolling_radius[i] * e->settling[i].settled;
             count++;
             side += s->wheel_side[i];
@@ -191,7 +205,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     for (int32_t i = 0; i < n; i++) {
         const tgi_settling *const wheel = settle(e, row, TG_WHEEL_SPEED + i, &pass);
         const tg_real w = s->rolling_radius[i] * wheel->settled, now = s->rolling_radius[i] * wheel->soon;
-        if (!tgi_is_recent(e, i, row->time)) continue;
+        if (tgi_rolls(e, i) || !tgi_is_recent(e, i, row->time)) continue;
         if (tgi_fabs(now) > soonest) soonest = tgi_fabs(now);
         if (now > forward) forward = now;
         if (-now > backward) backward = -now;

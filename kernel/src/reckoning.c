@@ -25,7 +25,7 @@ static void means(const tg_estimator *e, const tg_row *row, const tg_drive *driv
         pull += drive->load[i] * e->belief.x[i];
         const int32_t known = row && !isnan(row->value[TG_WHEEL_SPEED + i]) && !(row->doubt[i] > 0);
         const tg_real omega = known ? (tg_real)e->direction * row->value[TG_WHEEL_SPEED + i] : e->belief.x[n + 2 + i];
-        const int32_t counts = !row || known || row->time - e->wheel[i].time <= (double)e->settings.tuned.silence;
+        const int32_t counts = !tgi_rolls(e, i) && (!row || known || row->time - e->wheel[i].time <= (double)e->settings.tuned.silence);
         const tg_real middle = e->settings.rolling_radius[i] * omega + (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
         speed += counts ? middle : 0;
         believed += middle;

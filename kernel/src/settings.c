@@ -341,6 +341,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     e->settings = *settings;
     if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
     e->direction = 1;
+    for (int32_t i = 0; i < settings->machine.wheels; i++) e->rolls |= (settings->method != TG_SPEEDS && !settings->powered[i] && !settings->driven[i]) << i;
     e->yaw_time = -(double)INFINITY;
     work_out_constants(&e->settings, &e->constants);
     e->shock = e->constants.least_shock;

@@ -6,7 +6,7 @@ The frame is the body's: x forward, z up. Axles are listed front to rear, wheels
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -263,6 +263,10 @@ class Vehicle(Part):
     def free_wheels(self) -> tuple[str, ...]:
         """The wheels that are not driven: their slip says nothing of the drive."""
         return tuple(wheel for wheel, on in zip(self.wheels, self.driven, strict=True) if not on)
+
+    def rolling_wheels(self, channels: Collection[str]) -> tuple[str, ...]:
+        """The free wheels without a speed among ``channels``: they go as the ground does under them, without slip."""
+        return tuple(wheel for wheel in self.free_wheels if f"wheel_speed_{wheel}" not in channels)
 
     @cached_property
     def axle_mass(self) -> Floats:

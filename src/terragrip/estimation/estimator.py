@@ -86,9 +86,9 @@ class TractionEstimator:
         vehicle's size (``guessed`` lists those): better give it, or let :func:`estimate` determine it from a log.
     held: update period [s] of channels whose values are repeated between updates.
     channels: the columns of the samples. A drawbar force in ``channels`` is unknown before its first value, else it
-        is 0; an undriven wheel has a torque only if ``channels`` has one. Default: wheel speeds, ground speed and
-        torques of driven wheels. With speeds and no torque (``wheel_speed_<wheel>`` or ``wheel_based_speed``) slip
-        alone is estimated, whatever the ``method``: docs/methods.md.
+        is 0; an undriven wheel has a torque only if ``channels`` has one, and rolls with the ground until a sample has its
+        speed. Default: ground speed, and speeds and torques of driven wheels. With speeds and no torque
+        (``wheel_speed_<wheel>`` or ``wheel_based_speed``) slip alone is estimated, whatever the ``method``: docs/methods.md.
     gap: s without any wheel or ground speed after which the motion restarts.
     standstill_speed: m/s under which vehicle and wheels count as standing.
     together: how many wheels each wheel of ``vehicle`` represents (`terragrip.estimation.driveline`).
@@ -134,8 +134,19 @@ class TractionEstimator:
         else:
             slots = sample_slots(vehicle)
             out = estimate_slots(vehicle, adaptive=method_named(self.method).adapts)
-        self.noise, self.guessed = channel_noise(vehicle, tuple(slots), sensors)
+        self.noise, self.guessed = self._noise(tuple(slots), sensors)
         self._engine = Engine(self._settings(), slots, out)
+
+    def _noise(
+        self, inputs: tuple[str, ...], sensors: Mapping[str, float] | None
+    ) -> tuple[dict[str, float], tuple[str, ...]]:
+        """`channel_noise`; of a free wheel without a speed, which goes as the ground does, that of the ground speed."""
+        noise, guessed = channel_noise(self.vehicle, inputs, sensors)
+        if not self.rims:
+            for wheel in self.vehicle.rolling_wheels(self.channels):
+                if (name := f"wheel_speed_{wheel}") not in (sensors or {}):
+                    noise[name] = noise["ground_speed"] / self.vehicle.radii[wheel]
+        return noise, guessed
 
     def _settings(self) -> Any:
         """The kernel's settings for this estimator."""
@@ -273,7 +284,7 @@ class TractionEstimator:
         As for a new estimator: an SD missing in ``sensors`` is the vehicle file's, else a guess; a channel missing in ``held`` is
         not held. Raises InputError as the constructor does.
         """
-        self.noise, self.guessed = channel_noise(self.vehicle, self._engine.inputs, sensors)
+        self.noise, self.guessed = self._noise(self._engine.inputs, sensors)
         self.held = dict(held)
         self._engine.set_noise(self._settings())
 
@@ -337,9 +348,10 @@ class TractionEstimator:
 
 
 def default_channels(vehicle: Vehicle) -> tuple[str, ...]:
-    """The columns that samples of this vehicle have at least: speeds, and torques of driven wheels."""
+    """The columns that samples of this vehicle have at least: ground speed, and speeds and torques of driven wheels."""
     torques = [f"drive_torque_{w}" for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
-    return (*(f"wheel_speed_{w}" for w in vehicle.wheels), "ground_speed", *torques)
+    speeds = [name.replace("drive_torque", "wheel_speed") for name in torques]
+    return (*speeds, "ground_speed", *torques)
 
 
 def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:

@@ -94,6 +94,11 @@ def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, .
     if guessed:
         shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)
         notes.append(f"The noise of {shown} is a guess from the vehicle's size: give it under 'sensors'.")
+    rolling = () if estimator.rims else estimator.vehicle.rolling_wheels(estimator.channels)
+    if rolling:
+        notes.append(
+            f"No speed of {', '.join(rolling)} in the log: taken to roll with the ground, with a slip of 0."
+        )
     if estimator.slip_reference is not None or estimator.vehicle.uncertainty.drawbar_force is not None:
         notes = [note for note in notes if note != NOTHING_TOWED]
     if estimator.slip_reference is not None:

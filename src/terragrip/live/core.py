@@ -291,7 +291,7 @@ class Core:
             return []
         seen = {name for row in (first, *self.reorder.pending) for name in row.values}
         wheels = [name.removeprefix("wheel_speed_") for name in seen if name.startswith("wheel_speed_")]
-        absent = [wheel for wheel in self.vehicle.wheels if wheel not in wheels]
+        absent = [w for w in self.vehicle.wheels if w not in (*wheels, *self.vehicle.free_wheels)]
         if self.estimator is not None and [rim.wheel for rim in self.estimator.rims] == [DRIVE]:
             return []
         strange = sorted(wheel for wheel in wheels if wheel not in self.vehicle.wheels)

@@ -246,10 +246,11 @@ def check_channels(profile: Profile, vehicle: Vehicle, window: float) -> None:
     if speeds_alone(profile.channels, vehicle):
         return
     needed = ["ground_speed", *(f"wheel_speed_{wheel}" for wheel in vehicle.wheels)]
-    lacking = [name for name in needed if name not in profile.channels]
+    rolling = [f"wheel_speed_{wheel}" for wheel in vehicle.free_wheels]
+    lacking = [name for name in needed if name not in (*profile.channels, *rolling)]
     if lacking:
         raise InputError(
             f"the profile gives no {lacking[0]}",
             place="--profile",
-            hint="live estimates need the ground speed and each wheel's speed; without torques wheel_based_speed will do",
+            hint="live estimates need the ground speed and each driven wheel's speed; without torques wheel_based_speed will do",
         )

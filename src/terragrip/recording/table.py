@@ -241,7 +241,8 @@ class Recording(ByName):
     def check_against(self, vehicle: Vehicle) -> None:
         """Raise InputError unless the log's wheels and axles are the vehicle's, with all channels that estimates need.
 
-        A driven wheel needs a torque; an undriven one without a torque column has torque 0. A drawbar force
+        A driven wheel needs a speed and a torque; a free one without a speed rolls with the ground, and without a torque
+        column has torque 0. A drawbar force
         on two or more axles needs the vehicle's ``hitch_height``, since it moves load between them.
         """
         known = ", ".join(vehicle.wheels)
@@ -257,14 +258,11 @@ class Recording(ByName):
                     hint = f"write a unit in brackets: '{quantity}_{wheel} [{unit}]'"
                 raise self._unfit(name, f"the vehicle has no wheel {owner}", hint)
         for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True):
-            if wheel not in self.wheels:
+            if wheel not in self.wheels and (driven or self._like(f"wheel_speed_{wheel}")):
                 evidence = (
                     f"the log has wheel speeds for {', '.join(self.wheels)}; the vehicle has wheels {known}"
                 )
-                fix = (
-                    "name them alike" if driven else "map the ground speed over the radius of this free wheel"
-                )
-                raise self._missing(f"wheel_speed_{wheel}", "is missing", f"{evidence}; {fix}")
+                raise self._missing(f"wheel_speed_{wheel}", "is missing", f"{evidence}; name them alike")
             if driven and f"drive_torque_{wheel}" not in self.channels:
                 hint = "add it, or say 'driven: false' in the vehicle file if its axle has no drive"
                 raise self._missing(
@@ -274,10 +272,13 @@ class Recording(ByName):
             checks.require_hitch(vehicle, force, self.channels, self.source)
         checks.refuse_other_mass(vehicle, self.channels, self.source)
 
-    def _missing(self, column: str, problem: str, hint: str) -> InputError:
+    def _like(self, column: str) -> str | None:
+        """The unused column of the log that is named most like this one."""
         unused = "".join(n[len(checks.UNUSED) : -1] for n in self.notes if n.startswith(checks.UNUSED))
-        near = nearest(column, unused.split(", "))
-        if near:
+        return nearest(column, unused.split(", "))
+
+    def _missing(self, column: str, problem: str, hint: str) -> InputError:
+        if near := self._like(column):
             hint = f"the nearest column is {near!r}: rename it, or map it in a profile"
         return self._unfit(column, problem, hint, "vehicle#signals-that-are-missing")
 

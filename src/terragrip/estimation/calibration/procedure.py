@@ -101,11 +101,13 @@ def calibrate(
     corrected = [log for log, _ in completed]
     doubts += tuple(dict.fromkeys(text for _, notes in completed for text in notes))
 
+    measured = {wheel for log in logs for wheel in log.wheels}
     passes = windows(corrected, zeroed, RADIUS_WINDOW)
     rolling = rolling_radii(passes, zeroed, track_blocks(passes), sources)
     rolled = zeroed
     if isinstance(rolling, Rolling):
-        together = plausible(_possible(_radii(rolling, None, vehicle), vehicle, unknown), vehicle, unknown)
+        together = [q for q in _radii(rolling, None, vehicle) if q.wheel in measured]
+        together = plausible(_possible(together, vehicle, unknown), vehicle, unknown)
         rolled = Calibration(tuple(together), ()).apply(zeroed)
     else:
         unknown.append(rolling)
@@ -126,7 +128,8 @@ def calibrate(
         unknown += gains
     if isinstance(rolling, Rolling):
         apart = gains if isinstance(gains, RelativeGains) else None
-        quantities += _accepted(_radii(rolling, apart, vehicle, determined=bool(shared)), vehicle, unknown)
+        radii = _radii(rolling, apart, vehicle, determined=bool(shared))
+        quantities += _accepted([q for q in radii if q.wheel in measured], vehicle, unknown)
     quantities += shared
     try:
         quantities.append(identify_torque_scale(_with_gains(corrected, shared), rolled))

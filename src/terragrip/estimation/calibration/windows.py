@@ -70,7 +70,8 @@ class Windows:
 def windows(recordings: Sequence[Recording], vehicle: Vehicle, length: float) -> Windows:
     """Cut recordings into windows of ``length`` [s].
 
-    Channels are used as they are: remove held samples and zeros first. Without ``drawbar_force`` it is 0.
+    Channels are used as they are: remove held samples and zeros first. Without ``drawbar_force`` it is 0. A free wheel without a
+    speed goes as its hub does.
     """
     parts = [_windows_of(index, r, vehicle, length) for index, r in enumerate(recordings)]
     joined = {
@@ -101,8 +102,11 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     turn = np.nan_to_num(yaw)
     ahead, side = vehicle.receiver
     speed = middle_speed(mean("ground_speed"), turn, ahead=ahead, side=side)
-    wheel_speed = per_wheel("wheel_speed")
     across = np.sqrt(np.nan_to_num(mean("angular_velocity_z", power=2)))[:, None] * vehicle.wheel_ahead
+    # a steered wheel's way grows with the square of the turn, so the mean's does with its mean square
+    hubs = hub_speed(speed[:, None] - turn[:, None] * vehicle.wheel_side, across)
+    rolls = [wheel in vehicle.rolling_wheels(recording.channels) for wheel in wheels]
+    wheel_speed = np.where(rolls, hubs / vehicle.wheel_radius, per_wheel("wheel_speed"))
     pitch, measured = mean("pitch"), mean("acceleration_x")
     slope = np.nan_to_num(pitch)
     kinematic = _rate(speed, length) + GRAVITY * np.sin(slope)
@@ -142,8 +146,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         pitch=pitch,
         yaw_rate=yaw,
         lateral=lateral,
-        # a steered wheel's way grows with the square of the turn, so the mean's does with its mean square
-        hub_speed=hub_speed(speed[:, None] - turn[:, None] * vehicle.wheel_side, across),
+        hub_speed=hubs,
         wheel_speed=wheel_speed,
         wheel_acceleration=wheel_acceleration,
         torque=torque,
