@@ -173,7 +173,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, const 
 static int32_t wheels_are_silent(const tg_estimator *e, double time)
 {
     for (int32_t i = 0; i < e->settings.machine.wheels; i++)
-        if (e->wheel[i].count > 0 && !tgi_rolls(e, i) && time - e->wheel[i].time <= (double)e->settings.gap) return 0;
+        if (e->wheel[i].count > 0 && time - e->wheel[i].time <= (double)e->settings.gap && !tgi_rolls(e, i)) return 0;
     return 1;
 }
 
@@ -220,7 +220,7 @@ static int32_t is_blind(tg_estimator *e, const tg_row *row, int32_t gap)
 {
     if (gap) e->unseen = 3;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++)
-        if (e->wheel[i].count > 0 && !tgi_rolls(e, i) && e->wheel[i].time == row->time) e->unseen &= ~1;
+        if (e->wheel[i].count > 0 && e->wheel[i].time == row->time && !tgi_rolls(e, i)) e->unseen &= ~1;
     if (e->ground.count > 0 && e->ground.time == row->time) e->unseen &= ~2;
     return e->unseen != 0 || e->scene.any_silent > 0 || wheels_are_silent(e, row->time);
 }

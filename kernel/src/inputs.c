@@ -279,7 +279,7 @@ void tgi_find_silent(tg_estimator *e, double time)
     const int32_t exempt = e->standing || !e->seen_motion || time - e->measured_time > (double)s->gap;
     int32_t silent = !exempt && e->drawbar.count > 0 && is_silent(e, &e->drawbar, time);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
-        const int32_t speed = !tgi_rolls(e, i) && is_silent(e, &e->wheel[i], time), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
+        const int32_t speed = is_silent(e, &e->wheel[i], time) && !tgi_rolls(e, i), torque = s->driven[i] && is_silent(e, &e->torque[i], time);
         e->scene.silent[i] = exempt ? 0 : speed ? 2 : (tg_real)torque;
         silent |= e->scene.silent[i] > 0;
     }
