@@ -236,6 +236,8 @@ def test_where_torques_are_measured_decides_on_bearings_and_the_gear_ratio(
         wheel.vehicle.uncertainty.tire_rolling_resistance < motor.vehicle.uncertainty.tire_rolling_resistance
     )
     assert "scale: RATIO" in motor.to_yaml()
+    assert "drive_friction" in motor.to_yaml()
+    assert "drive_friction" not in wheel.to_yaml()
     assert "scale: RATIO" not in wheel.to_yaml() + unsaid.to_yaml()
     with pytest.raises(InputError, match=r"--torque-at: .*say wheel or motor"):
         make("rover", "torque", torque_at="gearbox")

@@ -292,6 +292,9 @@ def _said(made: Made) -> str:
     ]
     if made.torque_at == "motor":
         lines.append("Torques at the motor: give each 'scale: RATIO', the gear ratio, in the log's profile.")
+        lines.append(
+            "With the wheels lifted and turning, their torque is 'drive_friction' in the vehicle file."
+        )
     if lacking:
         lines.append(f"Find out first: {', '.join(lacking)}. Then 'terragrip calibrate' on a log.")
     elif made.signals == "bus-speed":

@@ -31,6 +31,8 @@ DRIVELINE = (
     "all driven wheels together can be estimated."
 )
 
+_WHICH = " wheel ... "
+
 
 @dataclass(frozen=True)
 class SlipReference:
@@ -53,14 +55,19 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     if has_engine_torque(log.channels) and vehicle.driveline is None:
         notes.append(DRIVELINE)
     radii = vehicle.radii if vehicle.knows_wheels else {}
+    alike = dict[str, list[str]]()  # a sentence, and the wheels of which it is true
     for rim in rims_of(vehicle, log.channels, log.source):
         at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius, radii=radii)
         if at is not None:
             zero[rim.wheel] = at
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None
         rims.append(at_zero(rim, at) if learns and at is not None else rim)
+        for one in _notes(rim, at, learns):
+            alike.setdefault(one.replace(f" wheel {rim.wheel} ", _WHICH), []).append(rim.wheel)
+    for one, wheels in alike.items():
         remedied = any(REMEDY in note for note in notes)  # which once is enough for all wheels
-        notes += [one.replace(f": {REMEDY}", "") if remedied else one for one in _notes(rim, at, learns)]
+        sentence = one.replace(_WHICH, f" wheel{'s' * (len(wheels) > 1)} {', '.join(wheels)} ")
+        notes.append(sentence.replace(f": {REMEDY}", "") if remedied else sentence)
     if "wheel_based_speed" in log.channels and not any(rim.wheel == DRIVE for rim in rims):
         notes.append("wheel_based_speed is not used: the wheels have speeds of their own.")
     band, rows = _dead_band(log, rims)

@@ -52,7 +52,9 @@ class Made:
             lines.append(f"# Slip alone: {_COUNTS[self.signals]}")
         if self.torque_at == "motor":
             lines.append(
-                "# Torques at the motor: the log's profile multiplies them by the gear ratio, 'scale: RATIO'."
+                "# Torques at the motor: the log's profile multiplies them by the gear ratio, 'scale: RATIO'.\n"
+                "# What motor and gears take at any speed is not assumed: with the wheels lifted and turning, it is their torque; write\n"
+                "# it as 'drive_friction'."
             )
         if self.assumed:
             lines.append(
