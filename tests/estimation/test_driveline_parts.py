@@ -286,3 +286,8 @@ def test_what_the_driveline_takes_widens_intervals_by_its_force_over_loads() -> 
         assert result[f"{name}_std"] == pytest.approx([*[np.hypot(own, change)] * 4, np.nan], nan_ok=True)
     assert result["net_traction_driven_std"][0] == pytest.approx(np.hypot(own, share - 300 / (6000 * G)))
     assert result["adhesion_driven"] == pytest.approx([0.4, 0.05, -0.4, 0.0, np.nan], nan_ok=True)
+    tire = machine.vehicle.tire_rolling_resistance
+    before, after = (
+        0.9 * (mu - rho) / (mu + tire) for mu, rho in ((0.4, 0.1), (0.41, 0.1 + 300 / (6000 * G)))
+    )
+    assert result["efficiency_driven_std"][0] == pytest.approx(np.hypot(own, after - before), rel=0.02)

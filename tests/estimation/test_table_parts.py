@@ -15,6 +15,7 @@ from terragrip.errors import InputError
 from terragrip.estimation import Estimates, estimate, estimated, methods
 from terragrip.estimation.batch import _Passes
 from terragrip.estimation.calibration.plausible import completed_by_positions
+from terragrip.estimation.columns import driven_of
 from terragrip.estimation.converting import convert
 from terragrip.estimation.driveline import DrivenMachine
 from terragrip.estimation.engine import EVENTS, refusal
@@ -308,3 +309,17 @@ def test_positions_add_a_yaw_rate_and_a_slope_where_no_sensor_does() -> None:
     assert completed_by_positions(whole) == (whole, [])
     still = Recording(time, {"latitude": 0 * time, "longitude": 0 * time})
     assert completed_by_positions(still) == (still, [])
+
+
+def test_driven_wheels_are_those_whose_axle_is_not_stated_to_roll_freely() -> None:
+    front, rear = {"wheels": ["fl", "fr"]}, {"wheels": ["rl", "rr"]}
+    wheels = ("fl", "fr", "rl", "rr")
+    for front_drives, rear_drives, driven in (
+        (False, True, wheels[2:]),
+        (True, False, wheels[:2]),
+        (False, False, wheels),
+    ):
+        axles = {"front": {**front, "driven": front_drives}, "rear": {**rear, "driven": rear_drives}}
+        assert driven_of(wheels, {"vehicle": {"axles": axles}}) == driven
+    assert driven_of(wheels, {"vehicle": {"axles": {"front": front, "rear": rear}}}) == wheels
+    assert driven_of(wheels, {}) == wheels

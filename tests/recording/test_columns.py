@@ -12,7 +12,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.recording.checks import how_to_pivot, place
-from terragrip.recording.columns import numbers, seconds, start_of, texts
+from terragrip.recording.columns import numbers, seconds, stamps_of, start_of, texts
 from terragrip.recording.frames import columns_of
 
 
@@ -160,3 +160,9 @@ def test_a_level_of_an_index_named_time_is_the_time() -> None:
     frame = pd.DataFrame({"machine": ["a", "a"], "time": [0.0, 0.5], "ground_speed": [1.0, 2.0]})
     columns = columns_of(frame.set_index(["machine", "time"]), None)
     assert columns["time"].tolist() == [0.0, 0.5]
+
+
+def test_cells_with_colons_that_are_no_times_are_named_where_they_begin() -> None:
+    with pytest.raises(InputError, match="'noon:ish' is not a time") as error:
+        stamps_of(np.array(["", "noon:ish", "noon:late"], dtype=object), "log.csv")
+    assert "row 2" in str(error.value)

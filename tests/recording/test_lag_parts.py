@@ -288,3 +288,15 @@ def test_points_that_a_wrong_stamp_would_need_are_not_laid_out() -> None:
     time = np.arange(0.0, 60.0, 0.1)
     assert _regular(time, np.ones(600)) is not None
     assert _regular(np.r_[time, 1e12], np.ones(601)) is None
+
+
+def test_a_pause_of_a_month_hides_no_lag_and_costs_no_points() -> None:
+    """Over ten days of points nothing was compared, and of three days it took a minute."""
+    time = np.arange(0.0, 200.0, STEP)
+    columns = {"wheel_speed_l": wander(time), "ground_speed": wander(time - 0.4)}
+    paused = time + 30 * 86400.0 * (time > 90)
+    plain, found = lag_within(time, columns), lag_within(paused, columns)
+    assert plain is not None
+    assert found is not None
+    assert found.seconds == pytest.approx(0.4, abs=0.02)
+    assert found.std < 2 * plain.std

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats, Ints
 from terragrip.recording.held import fresh_samples, held_period, known_part, measurable
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.stretches import without_pauses
 from terragrip.units import STANDARD_GRAVITY
 
 _STEP = 0.05  # s between the points on which speeds are compared
@@ -39,6 +40,7 @@ _SHARP = 0.03  # s, a standard deviation up to which _CERTAIN is enough for it: 
 STIFFNESS = 2.0
 _OWN_SURE = 3.0  # standard errors of what the log shows of a vehicle's own lag
 _WITHIN = 5.0  # s, the largest lag searched between channels of one file
+_PAUSE = 60.0  # s, or ten samples: across more nothing is compared, and three days of points took a minute
 _USUAL = 0.1  # s, prior SD of a receiver's delay, before a log shows it (ours): receivers filter
 _FILTERED = 0.2  # of a lag that was corrected: a filter of first order errs by 1/e of its lag where a change begins, a mere delay does not
 
@@ -211,6 +213,7 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
 
     The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """
+    time = without_pauses(time, max(_PAUSE, 10 * median(np.diff(time)))) if len(time) > 1 else time
     part = {name: measurable(values) for name, values in columns.items()}
     if "ground_speed" in part:
         part = {

@@ -48,6 +48,12 @@ def may_last(when: Floats, what: Floats) -> bool:
     return len(alike) >= least and bool(sliding_window_view(alike, least).all(axis=1).any())
 
 
+def without_pauses(time: Floats, longest: float) -> Floats:
+    """Instants (n,) [s] whose pauses are cut to ``longest`` [s]: as they are without any."""
+    steps = np.diff(time, prepend=time[:1])
+    return time if steps.max(initial=0.0) <= longest else time[0] + np.cumsum(np.minimum(steps, longest))
+
+
 def gaps(when: Floats) -> Bools:
     """Where samples at these instants (n,) are missing (n - 1,): no value is repeated across."""
     steps = np.diff(when)

@@ -11,6 +11,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.stretches import without_pauses
 from terragrip.recording.window_means import averaged
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def track_of(recording: Recording, window: float = WINDOW) -> Track | None:
         return None
     half = span // 2
     middle = slice(half, fixes - half)
-    near = np.r_[0.0, np.cumsum(np.minimum(np.diff(time), _PAUSE))]
+    near = without_pauses(time, _PAUSE)
     fits = [_fitted(near, x, np.arange(half, fixes - half), span, 2) for x in (north, east)]
     (_, vn, an), (_, ve, ae) = (result.T for result, _ in fits)
     an, ae, bent = 2 * an, 2 * ae, 2 * np.hypot(fits[0][1][:, 2], fits[1][1][:, 2]) / np.sqrt(2)
