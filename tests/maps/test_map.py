@@ -353,7 +353,8 @@ def test_outages_and_jumps_are_cut_not_smeared() -> None:
     assert any("jump" in note for note in made.notes)
 
 
-def test_positions_behind_the_wheels_are_moved_back() -> None:
+@pytest.mark.parametrize("pause", [0.0, 30 * 86400.0])
+def test_positions_behind_the_wheels_are_moved_back(pause: float) -> None:
     estimates = drive(*lanes(4, 60, 3))
     time = estimates.time
     pace = 1 + 0.6 * np.sin(0.5 * time) * (time > 5)  # a drive whose speed varies, or no lag could be seen
@@ -363,6 +364,7 @@ def test_positions_behind_the_wheels_are_moved_back() -> None:
     estimates.columns["ground_speed"] = pace
     late = {n: np.interp(scaled - 0.4, scaled, estimates[n]) for n in ("latitude", "longitude")}
     estimates.columns.update(late)
+    scaled = scaled + pause * (np.arange(len(scaled)) > len(scaled) // 2)
     places = places_of(replace(estimates, time=scaled), 32633)
     assert any(
         re.match(r"The positions are 0\.(3[5-9]|4[0-5]) .* behind the wheels", note) for note in places.notes

@@ -166,3 +166,10 @@ def test_cells_with_colons_that_are_no_times_are_named_where_they_begin() -> Non
     with pytest.raises(InputError, match="'noon:ish' is not a time") as error:
         stamps_of(np.array(["", "noon:ish", "noon:late"], dtype=object), "log.csv")
     assert "row 2" in str(error.value)
+
+
+def test_a_point_that_may_part_thousands_is_named_with_both_readings() -> None:
+    with pytest.raises(InputError, match=r"'1\.234' may be 1234 or 1\.234") as error:
+        numbers("drawbar_force", np.array(["800", "1.234"], dtype=object), np.array([0.0, 0.5]), "log.csv")
+    assert "row 2 (time 0.5 s)" in str(error.value)
+    assert "without a thousands separator" in str(error.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,24 @@ def test_work_headland_road_and_standing_are_told_by_the_track_alone(tractor: Pa
     assert np.mean(found == truth) > 0.9
     for what in (WORK, HEADLAND, ROAD, STANDING):
         assert np.mean(found[truth == what] == what) > 0.8, what
+
+
+def test_what_was_done_before_and_after_a_winter_is_as_without_it(tractor: Path) -> None:
+    """A second of it was a point: 1.3 GB for five months."""
+    run = run_of(tractor)
+    plain, table = parts_of(run), run.estimates.copy()
+    assert plain is not None
+    standing = np.flatnonzero(plain == STANDING)
+    table["time"] += 150 * 86400.0 * (np.arange(len(table)) > standing[len(standing) // 2])
+    tracemalloc.start()
+    try:
+        found = parts_of(Run("winter", table, run.method, vehicle=run.vehicle))
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 100e6
+    assert found is not None
+    assert np.mean(found == plain) > 0.98  # seconds begin elsewhere
 
 
 def test_a_mean_counts_what_is_known_of_each_piece() -> None:

@@ -11,7 +11,7 @@ from terragrip.arrays import Bools, Floats, Ints
 from terragrip.errors import InputError
 from terragrip.maps.plausible import refuse_impossible
 from terragrip.physics.geodesy import metres_of
-from terragrip.recording.lag import lag_between, speed_of, wheels_of
+from terragrip.recording.lag import lag_between, speed_of, wheels_of, without_long_pauses
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -169,8 +169,10 @@ def _late(estimates: Estimates, time: Floats, east: Floats, north: Floats) -> tu
     if not names or len(time) < LEAST_FIXES:
         return 0.0, ()
     speed = np.hypot(np.diff(east), np.diff(north)) / np.maximum(wait, 1e-9)
-    wheels = wheels_of(estimates.time, {name: estimates[name] for name in names})
-    fixes = speed_of(time[1:] - 0.5 * wait, {"ground_speed": speed})
+    clock = without_long_pauses(estimates.time)
+    wheels = wheels_of(clock, {name: estimates[name] for name in names})
+    middles = np.interp(time[1:] - 0.5 * wait, estimates.time, clock)
+    fixes = speed_of(middles, {"ground_speed": speed})
     lag = None if wheels is None or fixes is None else lag_between(wheels, fixes, reach=LATEST)
     if lag is None or not lag.is_of_the_clock or lag.seconds < 0:
         return 0.0, ()

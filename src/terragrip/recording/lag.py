@@ -213,7 +213,7 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
 
     The file cannot show which of the two sensors is late; slip needs only that both are of one instant.
     """
-    time = without_pauses(time, max(_PAUSE, 10 * median(np.diff(time)))) if len(time) > 1 else time
+    time = without_long_pauses(time)
     part = {name: measurable(values) for name, values in columns.items()}
     if "ground_speed" in part:
         part = {
@@ -224,6 +224,11 @@ def lag_within(time: Floats, columns: Mapping[str, npt.NDArray[Any]]) -> Lag | N
     wheels = wheels_of(time, part)
     ground = speed_of(time, {"ground_speed": part["ground_speed"]}) if "ground_speed" in part else None
     return None if wheels is None or ground is None else lag_between(wheels, ground, reach=_WITHIN)
+
+
+def without_long_pauses(time: Floats) -> Floats:
+    """Instants (n,) [s] whose pauses are short enough to compare speeds on points of all of the time."""
+    return without_pauses(time, max(_PAUSE, 10 * median(np.diff(time)))) if len(time) > 1 else time
 
 
 def delay_of(lag: Lag | None) -> float:

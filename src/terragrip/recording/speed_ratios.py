@@ -230,7 +230,10 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> t
     chord = np.hypot(np.diff(north[::2]), np.diff(east[::2]))
     halves = np.hypot(np.diff(north), np.diff(east)).reshape(-1, 2).sum(axis=1)
     edges, made = edges[::2], np.diff(np.interp(edges[::2], recording.time, way))
-    moving = (np.diff(edges) < 1.1 * length) & (made > 0.3 * quantile(made, 0.95))
+    whole = np.diff(edges) < 1.1 * length  # no pause between its edges
+    if not whole.any():
+        return 0.0, 0.0
+    moving = whole & (made > 0.3 * quantile(made[whole], 0.95))
     for when in (recording.time[np.isfinite(recording.channels["ground_speed"])], track.time):
         moving &= np.histogram(when, edges)[0] > 0.5 * length / median(np.diff(when))  # no gap
     straight = moving & (halves < _STRAIGHT * chord)

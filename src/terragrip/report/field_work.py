@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from terragrip.arrays import Floats
 from terragrip.physics.geodesy import metres_of
+from terragrip.recording.stretches import without_pauses
 from terragrip.report.runs import Run, label_stretches
 
 STANDING, HEADLAND, WORK, ROAD = "standing", "headland", "work", "road"
@@ -19,6 +20,7 @@ WINDOW = 6.0
 """Seconds that a heading is taken over."""
 PASS = 10.0
 """Seconds that a straight stretch lasts at least: shorter ones belong to a turn on the headland."""
+_PAUSE = 3600.0  # s
 FASTER = 1.3
 """A stretch is road where it is driven faster than the passes' median speed by this factor."""
 
@@ -33,10 +35,11 @@ def parts_of(run: Run) -> NDArray[np.object_] | None:
         return None
     north, east = metres_of(run.estimated("latitude"), run.estimated("longitude"))
     fixed = np.isfinite(north) & np.isfinite(east)
-    if fixed.sum() < 20 or run.time[fixed][-1] - run.time[fixed][0] < 4 * PASS:
+    time = without_pauses(run.time, _PAUSE)
+    if fixed.sum() < 20 or time[fixed][-1] - time[fixed][0] < 4 * PASS:
         return None
-    grid = np.arange(run.time[fixed][0], run.time[fixed][-1], 1.0)
-    x, y = (np.interp(grid, run.time[fixed], values[fixed]) for values in (east, north))
+    grid = np.arange(time[fixed][0], time[fixed][-1], 1.0)
+    x, y = (np.interp(grid, time[fixed], values[fixed]) for values in (east, north))
     speed, turn = _motion(x, y)
     standing = speed < SLOWEST
     if standing.all():
@@ -52,7 +55,7 @@ def parts_of(run: Run) -> NDArray[np.object_] | None:
         for (first, last), mean in zip(passes, speeds, strict=True):
             if mean > FASTER * usual:
                 what[first : last + 1] = ROAD
-    nearest = np.clip(np.round(run.time - grid[0]).astype(int), 0, len(grid) - 1)
+    nearest = np.clip(np.round(time - grid[0]).astype(int), 0, len(grid) - 1)
     return what[nearest]
 
 
