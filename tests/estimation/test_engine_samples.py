@@ -75,6 +75,20 @@ def test_samples_give_the_digits_of_the_whole_log_across_a_snapshot() -> None:
     assert np.isnan(whole["adhesion_driven"][60:70]).all()  # of the shift
 
 
+def test_events_are_those_of_the_whole_log() -> None:
+    log, vehicle = work(), tractor()
+    drives = log.time < 8
+    speeds = ("ground_speed", "wheel_based_speed")
+    stops = log.with_channels(**{n: np.where(drives, log.channels[n], 0.0) for n in speeds})
+    whole = tg.estimate(stops, vehicle, "kalman", sensors=NOISE, held={})
+    live = live_estimator(
+        vehicle, "kalman", tuple(log.channels), sensors=NOISE, held={}, driveline=whole.about["driveline"]
+    )
+    events = [live.update_at(time, sample).event for time, sample in rows_of(stops)]
+    assert events == whole["event"].tolist()
+    assert "standstill" in events
+
+
 @pytest.mark.parametrize("change", [{}, {"time": -1.0}, {"time": np.nan}, {"engine_speed": np.inf}])
 def test_a_refused_sample_leaves_no_row_behind(change: dict[str, float]) -> None:
     """The sample before once more, as of another gear; an earlier one; one of no instant; one that cannot be."""

@@ -31,7 +31,7 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     every = list(vehicle.axles.items())
     axles = every[0], every[-1]
     needed = {"ground_speed", *(f"wheel_speed_{w}" for _, axle in axles for w in axle.wheels)}
-    states = len(every) < 2 or vehicle.articulated or any(axle.steered for _, axle in every)
+    states = vehicle.articulated or any(axle.steered for _, axle in every)
     if turn is None or states or not needed <= recording.channels.keys():
         return []
     ground = filled(recording.time, recording.channels["ground_speed"])
