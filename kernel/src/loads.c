@@ -111,7 +111,7 @@ static void oppose_turning(const tg_estimator *e, tg_drive *drive)
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const tg_real turning = s->rolling_radius[i] * e->settling[i].soon / s->standstill_speed;
-        if (!(tgi_fabs(turning) > 0)) continue;
+        if (d * turning >= 0 && !(s->drive_friction[i] > 0)) continue;
         const tg_real way = turning < -1 ? -1 : turning > 1 ? 1 : turning;
         tg_real less = s->drive_friction[i] * way;
         if (d * way < 0) less += 2 * way * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];

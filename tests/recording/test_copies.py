@@ -50,6 +50,20 @@ def test_torques_without_noise_may_be_alike(columns: Columns, vehicle: Vehicle) 
     assert notes_on(columns | dict.fromkeys(TORQUES, 0.0 * smooth), vehicle) == []
 
 
+def test_a_motors_speed_rounded_to_whole_turns_is_one_signal_where_the_machine_turns(
+    columns: Columns, vehicle: Vehicle
+) -> None:
+    """One motor for all wheels: 1 rpm of 2000 is too little to be noise."""
+    coarse = np.round(10 * np.sin(columns["time"] / 7) + 2000) / 500
+    motor = columns | dict.fromkeys(("wheel_speed_fl", "wheel_speed_fr"), coarse)
+    turning = np.where(columns["time"] > 20, 0.4, 0.0)
+    tracked = Vehicle.from_dict({**vehicle.to_dict(), "track": 0.5})
+    assert notes_on(motor | {"angular_velocity_z": 0 * turning}, tracked) == []
+    (note,) = notes_on(motor | {"angular_velocity_z": turning}, tracked)
+    assert "wheel_speed_fl and wheel_speed_fr are one signal" in note
+    assert "unless a lock couples the wheels" in note
+
+
 def test_a_speed_of_both_sides_is_named_and_one_side_of_a_tracked_vehicle_is_not(
     columns: Columns, vehicle: Vehicle
 ) -> None:

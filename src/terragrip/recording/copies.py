@@ -15,7 +15,8 @@ from terragrip.recording.held import measured_part
 from terragrip.recording.lag import is_copy
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import quantile
-from terragrip.recording.stretches import is_one_value
+from terragrip.recording.stretches import DRIVING, is_one_value
+from terragrip.recording.turns import filled
 from terragrip.written_times import span
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 _FEW = 100  # rows
 _NOISY = 1e-3  # of a channel's size: less need not be noise
+_APART = 0.1  # of the pace, that hubs of an axle differ by in a turn
 _CHANNELS = 4  # that change within the rows
 _CHANGES = 10  # of each of these: a coarse channel has two values to choose from each time, all together 2^40
 _MISSING = np.int64(0x7FF8 << 48)
@@ -36,25 +38,41 @@ def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         "intervals hold an open differential's friction, no lock. If it is the sum of their torques, divide it ('scale:' in the profile)."
         for group in _groups(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
+    turns = _turns(recording, vehicle)
     for axle in vehicle.axles.values():
         names = [f"wheel_speed_{wheel}" for wheel in (axle.wheels[0], axle.wheels[-1])]
-        if len(axle.wheels) < 2 or not _groups(recording, names) or _is_of_the_ground(recording, names[0]):
+        if (
+            len(axle.wheels) < 2
+            or not _groups(recording, names, turns)
+            or _is_of_the_ground(recording, names[0])
+        ):
             continue
         notes.append(
-            f"{' and '.join(names)} are one signal: in turns the slips of both sides are wrong. Give it once, as wheel_based_speed [m/s], "
-            "or the wheels' own speeds."
+            f"{' and '.join(names)} are one signal: in turns the slips of both sides are wrong, unless a lock couples the wheels. Give it "
+            "once, as wheel_based_speed [m/s], or the wheels' own speeds."
         )
     return notes
 
 
-def _groups(recording: Recording, names: list[str]) -> list[list[str]]:
-    """Columns that are in proportion to each other, noise included."""
+def _turns(recording: Recording, vehicle: Vehicle) -> bool:
+    """Whether the gyroscope shows turns in which no two wheels of an axle go alike, and so need no noise to be one signal."""
+    yaw, ground = (recording.channels.get(name) for name in ("angular_velocity_z", "ground_speed"))
+    if yaw is None or ground is None:
+        return False
+    apart = np.abs(filled(recording.time, yaw)) * (vehicle.track or 0.0)
+    pace = np.abs(filled(recording.time, ground))
+    usual = quantile(pace, 0.95)
+    return bool(np.sum((pace > DRIVING * usual) & (apart > _APART * pace)) > _FEW)
+
+
+def _groups(recording: Recording, names: list[str], noiseless: bool = False) -> list[list[str]]:
+    """Columns that are in proportion to each other, noise included unless it need not be there (``noiseless``)."""
     left = [name for name in names if name in recording.channels]
     groups = []
     while left:
         first, *others = left
         same = [name for name in others if _is_same(recording.channels[name], recording.channels[first])]
-        if same and _is_noisy(recording, first):
+        if same and (noiseless or _is_noisy(recording, first)):
             groups.append([first, *same])
         left = [name for name in others if name not in same]
     return groups
