@@ -54,7 +54,9 @@ def test_a_motors_speed_rounded_to_whole_turns_is_one_signal_where_the_machine_t
     columns: Columns, vehicle: Vehicle
 ) -> None:
     """One motor for all wheels: 1 rpm of 2000 is too little to be noise."""
-    coarse = np.round(10 * np.sin(columns["time"] / 7) + 2000) / 500
+    coarse = (
+        np.round(np.where(columns["time"] > 8, 2000 + 10 * np.sin(columns["time"] / 7), 0)) / 500
+    )  # it stands at first
     motor = columns | dict.fromkeys(("wheel_speed_fl", "wheel_speed_fr"), coarse)
     turning = np.where(columns["time"] > 20, 0.4, 0.0)
     tracked = Vehicle.from_dict({**vehicle.to_dict(), "track": 0.5})

@@ -38,18 +38,16 @@ def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         "intervals hold an open differential's friction, no lock. If it is the sum of their torques, divide it ('scale:' in the profile)."
         for group in _groups(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
-    turns = _turns(recording, vehicle)
+    turns, pairs = _turns(recording, vehicle), []
     for axle in vehicle.axles.values():
         names = [f"wheel_speed_{wheel}" for wheel in (axle.wheels[0], axle.wheels[-1])]
-        if (
-            len(axle.wheels) < 2
-            or not _groups(recording, names, turns)
-            or _is_of_the_ground(recording, names[0])
-        ):
-            continue
+        own = len(axle.wheels) < 2 or not _groups(recording, names, turns)
+        if not own and not _is_of_the_ground(recording, names[0]):
+            pairs.append(" and ".join(names))
+    if pairs:
         notes.append(
-            f"{' and '.join(names)} are one signal: in turns the slips of both sides are wrong, unless a lock couples the wheels. Give it "
-            "once, as wheel_based_speed [m/s], or the wheels' own speeds."
+            f"{', '.join(pairs)} are {'each ' * (len(pairs) > 1)}one signal: in turns the slips of both sides are wrong, unless a lock "
+            "couples the wheels. Give it once, as wheel_based_speed [m/s], or the wheels' own speeds."
         )
     return notes
 
@@ -79,11 +77,12 @@ def _groups(recording: Recording, names: list[str], noiseless: bool = False) -> 
 
 
 def _is_same(one: Floats, other: Floats) -> bool:
-    for rows in (slice(_FEW), slice(None)):  # of most channels the first show it already
+    for rows in (slice(_FEW), slice(None)):  # of most channels the first show it already, but at rest
         known = np.isfinite(one[rows]) & np.isfinite(other[rows])
-        if known.any() and not is_copy(one[rows][known], other[rows][known]):
+        moves = bool(np.any(other[rows][known]))
+        if moves and not is_copy(one[rows][known], other[rows][known]):
             return False
-    return bool(known.sum() > _FEW)
+    return moves and bool(known.sum() > _FEW)
 
 
 def _is_noisy(recording: Recording, name: str) -> bool:
