@@ -89,6 +89,7 @@ SIGNS = {
     "pto_speed_front": "the same, of a power take-off in front",
     "drawbar_force": "horizontal force of the tool on the machine, backward positive; absent: nothing is towed",
     "hitch_load": "vertical force of the tool on the machine's hitch, down positive; absent: nothing hangs there",
+    "brake": "of a friction brake, 0 released to 1 pressed: a switch, or a share of its way or pressure; absent: none acts",
     "mass": "of the whole machine, without what is towed; absent: the vehicle file's throughout",
     "acceleration_x": "specific force along the body, forward positive",
     "acceleration_y": "specific force across the body, to the left positive",

@@ -200,6 +200,7 @@ enum {
     TG_YAW_RATE = 30,        /* rad/s, to the left positive */
     TG_MASS = 31,            /* kg, of the whole machine, where tanks or hoppers change it */
     TG_HITCH_LOAD = 32,      /* N, what hangs on the hitch presses down on it */
+    TG_BRAKE = 33,           /* share, 0 released to 1: beyond a small part of it a brake acts on the wheels that no torque shows */
     TG_SLOTS = 36            /* whole lanes; the last ones are not used */
 };
 

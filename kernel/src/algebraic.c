@@ -56,7 +56,7 @@ static void spread(tg_estimator *e, const tg_drive *drive)
     b->P[v * stride + v] = ground;
     for (int32_t i = 0; i < n; i++) {
         tg_real lever = 1 / (m->radius[i] * drive->load[i]), wheel = s->noise[TG_WHEEL_SPEED + i];
-        tg_real torque = s->driven[i] ? smooth_variance(s->noise[TG_DRIVE_TORQUE + i], a->gain) : 0;
+        tg_real torque = e->braked ? e->constants.unknown_torque[i] : s->driven[i] ? smooth_variance(s->noise[TG_DRIVE_TORQUE + i], a->gain) : 0;
         tg_real spin = m->inertia[i] * wheel * inverse_tau;
         tg_real mu = (torque + spin * spin) * lever * lever;
         int32_t omega = n + 2 + i;

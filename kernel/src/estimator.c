@@ -308,10 +308,10 @@ static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, 
     tgi_reckon(e, &drive, dt, course == TG_GO, row, q);
     if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, row);
     report_adaptation(e, out->value);
-    const int32_t lost = !go_on(e, row, &drive, &now, course, dt, q), breaks = gap || lost;
+    const int32_t lost = !go_on(e, row, &drive, &now, course, dt, q), breaks = gap || lost, flows = course == TG_GO && !breaks && !e->braked;
     balance_forces(e, &drive, row->time);
-    tgi_watch_roughness(e, course == TG_GO && !breaks, e->standing || breaks ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
-    if (course == TG_GO && !row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
+    tgi_watch_roughness(e, flows, e->standing || breaks || e->braked ? 0 : speed_of_hubs(e) * dt); /* nothing shows how far it went in a gap */
+    if (course == TG_GO && !e->braked && !row->reckoned && !isnan(row->value[TG_GROUND_SPEED])) tgi_remember_slip(e, &drive, dt);
 
     if (course == TG_GO && !breaks) e->distance += (double)((travelled + tgi_fabs(e->belief.x[n + 1])) / 2 * dt);
     tgi_end_row(e, row, out);
@@ -321,7 +321,7 @@ static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, 
     tgi_watch_over(e, row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
     out->event = tgi_event_of(e, row, gap || blind || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
-    tgi_curves(e, course == TG_GO && learn && !row->outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
+    tgi_curves(e, flows && learn && !row->outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
 }
 
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)

@@ -32,6 +32,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real value[TG_SLOTS];
     int32_t measured; /* any wheel or ground speed */
     int32_t outlier;
+    tg_real missed_braking; /* of a braked vehicle: variance of rho_s by the brake before its first sample */
     int32_t reckoned; /* the ground speed is not measured but reckoned */
     int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
     tg_real wheel_variance[8];
@@ -153,6 +154,10 @@ struct tg_estimator {
     int32_t rolls;             /* bits: a free wheel whose speed was never measured, which goes as its hub does */
     int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c */
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
+    int32_t braked;            /* a brake turns the wheels, by an unknown torque */
+    int32_t pressed;           /* its last sample, */
+    tg_real unbraked;          /* and rho_s when it came */
+    double braked_time;        /* of the last row with a pressed brake; before the first -INFINITY */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
     tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate; else 0 */

@@ -4,6 +4,8 @@
 #define TG_LEAST_SAMPLES 4 /* before any can be called a spike */
 #define TG_PAUSE 10        /* intervals, beyond a gap: a longer silence is a pause */
 #define TG_CHATTER ((tg_real)2 / 3)
+#define TG_PRESSED ((tg_real)0.05) /* of a brake's whole way or pressure: less is its play, or its sensor's zero */
+#define TG_BRAKE_TIME 0.25 /* s that a brake acts after it is let go, and in which adhesion changes by its prior SD */
 #define TG_AHEAD 4 /* intervals that the change over one of them is continued at most: of two samples at nearly one instant it is their noise */
 
 /* An input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
@@ -95,8 +97,8 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t am
     tg_real leap[8];
     int32_t leaps = 0;
     for (int32_t i = 0; i < wheels; i++) {
-        const int32_t possible = !rate || h[i].spike < tgi_square(rate[i] * h[i].interval);
-        leap[i] = h[i].spike > 0 && h[i].time == time && possible ? h[i].raw - h[i].calm : 0;
+        const int32_t leapt = h[i].spike > 0 && h[i].time == time && (!rate || h[i].spike < tgi_square(rate[i] * h[i].interval));
+        leap[i] = leapt ? h[i].raw - h[i].calm : 0;
         leaps += leap[i] != 0;
     }
     if (leaps < 2) return;
@@ -181,6 +183,32 @@ static tg_real chatter(const tg_hold *h, tg_real noise)
     return back > TG_CHATTER * h->level && back > 4 * white ? back - white : 0;
 }
 
+/* A brake, pressed or just let go, acts with a torque that no channel shows: while it does, adhesion follows the vehicle's motion alone.
+ * What it did before its first sample went into rho_s, which is then unsure by twice its change since the sample before: it follows late. */
+static void watch_brake(tg_estimator *e, tg_row *row)
+{
+    const tg_real share = row->value[TG_BRAKE], rho = e->belief.x[e->settings.machine.wheels];
+    row->missed_braking = 0;
+    if (!isnan(share)) {
+        if (share > TG_PRESSED && !e->pressed) row->missed_braking = tgi_square(2 * (rho - e->unbraked));
+        e->pressed = share > TG_PRESSED;
+        e->unbraked = rho;
+    }
+    if (e->pressed) e->braked_time = row->time;
+    e->braked = row->time - e->braked_time <= TG_BRAKE_TIME;
+}
+
+static void brake_noise(const tg_estimator *e, const tg_row *row, tg_real dt, tg_real *q)
+{
+    const int32_t n = e->settings.machine.wheels;
+    const tg_real share = row->missed_braking > 0 ? 1 : dt / (tg_real)TG_BRAKE_TIME;
+    q[2 * n + 1] += row->missed_braking;
+    for (int32_t i = 0; i < n; i++) {
+        q[i] += 2 * e->settings.gap * dt * e->constants.unknown_torque[i] * tgi_square(e->filter.inverse_inertia[i]);
+        q[n + 1 + i] += tgi_square(e->settings.prior_adhesion_std) * share;
+    }
+}
+
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
@@ -208,6 +236,7 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
         row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(drive->inverse_mass);
         q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);
     }
+    if (e->braked) brake_noise(e, row, dt, q);
     if (e->pitch.count > 0)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
 }
@@ -217,6 +246,7 @@ void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive
     const tg_settings *s = &e->settings;
     int32_t driven = 0;
     memset(drive, 0, sizeof *drive);
+    if (e->braked || !isnan(row->value[TG_BRAKE])) watch_brake(e, row);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         tgi_hold_update(e, &e->torque[i], row, TG_DRIVE_TORQUE + i, dt, 0);

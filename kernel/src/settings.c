@@ -223,7 +223,7 @@ static int has_channel(const tg_settings *s, int32_t slot)
     if (torque >= 0 && torque < TG_MAX_WHEELS) return torque < s->machine.wheels && s->driven[torque];
     if (slot == TG_MASS) return s->weighed;
     if (slot == TG_HITCH_LOAD) return s->carrying;
-    return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE;
+    return slot < TG_YAW_RATE ? slot - TG_VERTICAL_LOAD < s->axles : slot == TG_YAW_RATE || slot == TG_BRAKE;
 }
 
 /* Which wheels the watch looks at; on which side of the machine each is, how much it bears there, and which other one drives on its axle. */
@@ -342,7 +342,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
     e->direction = 1;
     for (int32_t i = 0; i < settings->machine.wheels; i++) e->rolls |= (settings->method != TG_SPEEDS && !settings->powered[i] && !settings->driven[i]) << i;
-    e->yaw_time = -(double)INFINITY;
+    e->yaw_time = e->braked_time = -(double)INFINITY;
     work_out_constants(&e->settings, &e->constants);
     e->shock = e->constants.least_shock;
     e->slope.error_variance = tgi_square(settings->slope_spread);

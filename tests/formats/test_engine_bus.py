@@ -60,3 +60,17 @@ def test_inspect_proposes_the_engine_and_says_what_its_torque_is_good_for(tmp_pa
     (tmp_path / "p.yaml").write_text(with_driveline.profile)
     recording = tg.read(log, tmp_path / "p.yaml")
     assert np.nanmax(np.abs(recording["engine_friction_share"] - 0.08)) < 1e-12
+
+
+def test_a_brake_switch_is_read_without_its_codes(tmp_path: Path) -> None:
+    """CCVS1's byte 4, bits 5 and 6: 0 released, 1 pressed, 2 error, 3 not available."""
+    states = (0, 1, 1, 3, 2, 0)
+    frames = [
+        (START + 0.1 * k, 0x18FEF100, b"\xff\x00\x02" + bytes([states[k // 10] << 4]) + b"\xff" * 4)
+        for k in range(60)
+    ]
+    frames += [(START + 0.1 * k + 0.004, GROUND_BASED, payload(2.0)) for k in range(60)]
+    log = write_log(tmp_path / "log.blf", frames)
+    brake = tg.read(log, "tractor-isobus")["brake"]
+    np.testing.assert_array_equal(brake[np.isfinite(brake)], np.repeat([0.0, 1.0, 1.0, 0.0], 10))
+    assert inspect(log).proposals["brake"].entry["from"] == "BrakeSwitch"

@@ -104,7 +104,7 @@ def test_a_trailer_on_hills_that_nothing_measures_is_no_wrong_unit(seed: int) ->
 @pytest.mark.parametrize(
     ("name", "factor", "cause"),
     [
-        ("mass", 1.6, "check the mass, or brakes that the torques do not contain."),
+        ("mass", 1.6, "check the mass, or brakes that the torques do not contain (give a channel 'brake')."),
         ("mass", 1 / 1.6, "check the mass."),
         ("drive_torque", 1.5, "check the torques' scale"),
         ("drive_torque", 1 / 1.5, "check the torques' scale"),

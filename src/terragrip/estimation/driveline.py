@@ -87,14 +87,16 @@ class DrivenMachine:
     ) -> DrivenMachine:
         """While samples of these ``channels`` come in: as the vehicle file has it, or an earlier log (``known``, by `to_dict`).
 
-        What a bus may send or not (drawbar force, the engine's friction) is as if it did not, until it does; a PTO's speed counts though
-        the earlier log had none. Raises InputError as `of_log`.
+        What a bus may send or not (drawbar force, the engine's friction) is as if it did not, until it does; a PTO's speed, and a brake,
+        count though the earlier log had none. Raises InputError as `of_log`.
         """
         assert vehicle.driveline is not None
         if known is not None:
             rim = None if known["rim"] is None else Rim(**known["rim"])
             there = tuple(name for name in known["channels"] if name in channels)
-            there += tuple(name for name in channels if name.startswith("pto_") and name not in there)
+            there += tuple(
+                name for name in channels if name.startswith(("pto_", "brake")) and name not in there
+            )
             return cls(vehicle, there, EngineTorque.from_dict(known["engine"]), rim, known["dead_band"])
         there = tuple(n for n in channels if n not in ("drawbar_force", "engine_friction_share"))
         waits = "engine_reference_torque" in channels

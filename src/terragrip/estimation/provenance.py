@@ -9,7 +9,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from terragrip.errors import InputError
+from terragrip.estimation.methods import SLIP_ONLY
 from terragrip.recording import unit_warnings
+from terragrip.recording.brake import braked
 from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
 
@@ -90,6 +92,11 @@ def _is_number(value: object) -> bool:
 def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, ...]:
     """Sentences of the reader, on units that are likely wrong, and on what the estimator had to assume."""
     notes = [*recording.notes, *unit_warnings(recording, estimator.vehicle)]
+    braking = float(braked(recording).mean())
+    if braking > 0 and estimator.method != SLIP_ONLY.name:
+        notes.append(
+            f"A brake acts in {100 * braking:.2g} % of the log: there adhesion follows the motion alone, and a wheel's own is not known."
+        )
     guessed = [name for name in estimator.guessed if name in recording.channels]
     if guessed:
         shown = ", ".join(f"{name} ({estimator.noise[name]:.3g})" for name in guessed)

@@ -81,6 +81,7 @@ def sample_slots(vehicle: Vehicle) -> dict[str, int]:
         **{f"vertical_load_{a}": lib.TG_VERTICAL_LOAD + k for k, a in enumerate(vehicle.axle_names)},
         "mass": lib.TG_MASS,
         "hitch_load": lib.TG_HITCH_LOAD,
+        "brake": lib.TG_BRAKE,
     }
 
 

@@ -122,6 +122,9 @@ def kind_of(unit: str | None) -> str | None:
         return "other"
 
 
+_BRAKE = re.compile(r"^(?!.*(park|hand)).*(brake|brems).*(switch|pedal|pressed|licht|light|schalter)")
+
+
 def candidates_of(column: Column) -> list[Candidate]:
     """The channels that a column may be, by its name and unit."""
     return [one for one in _by_name(column) if column.kind is None or _fits(column.kind, one.channel)]
@@ -144,6 +147,8 @@ def _by_name(column: Column) -> list[Candidate]:
     standard = _on_the_bus().get(last)
     if standard is not None:
         return [Candidate(standard, 0.95, ON_THE_BUS)]
+    if _BRAKE.search("".join(column.name.words)) and not column.name.has("command"):
+        return [Candidate("brake", 0.7, "a brake's switch or pedal")]
     if column.name.has("command", "statistic", "change", "other"):
         return []
     ways = (_of_wheels, _of_motion, _of_place, _of_speed)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.recording.brake import braked
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import quantile
 from terragrip.recording.turns import filled
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _CALM, _SLOW = 0.6, 12.0  # s: faster changes are noise, slower ones the ground
 _MOVING = 0.1  # of the speed that a twentieth of the drive exceeds
 _SLIP = 0.3  # beyond, resistance grows with the pull
+_BRAKED = 1e-6  # of a window: what a brake does is in no torque
 _LEAST = 40.0  # s of driving: in 22 s one start outweighs all blocks (a right log in 531 was named)
 _BLOCKS = 12  # for the jackknife
 _STARTS = 2.5  # blocks among which the rims' change is spread, by its squares: a start or two have no scatter
@@ -100,6 +102,7 @@ class Courses:
         rows = (speed > _MOVING * quantile(speed, 0.95)) & (rim > 0)
         if vehicle is not None:
             rows &= rim - speed < _SLIP * rim
+        rows &= smooth(np.interp(points, time, braked(recording)), 2 * _CALM, step) < _BRAKED
         if rows.sum() * step < _LEAST:
             return None
 
@@ -214,7 +217,7 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
 
 def _imbalance(mass: Range, beside: str, causes: list[str], vehicle: Vehicle) -> str:
     if mass.high < 1:
-        causes = [*causes, "brakes that the torques do not contain"]
+        causes = [*causes, "brakes that the torques do not contain (give a channel 'brake')"]
     return (
         f"In starts and stops the drive torques over the wheel radius change by {mass.value:.2g} times the force that moves "
         f"{vehicle.mass:.4g} kg{beside}: check {', or '.join(causes)}."

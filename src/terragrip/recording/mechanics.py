@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
+from terragrip.recording.brake import braked
 from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.pulls import PULL, pull_warnings, silent_cell
 from terragrip.recording.ranks import median
@@ -207,6 +208,10 @@ def means_of(recording: Recording, vehicle: Vehicle | None = None) -> Means | No
         return None
     change = np.r_[np.nan, (mean[2:] - mean[:-2]) / (2 * length), np.nan]
     rows = np.isfinite(change) & (np.nan_to_num(mean) > _MOVING * float(np.nanquantile(mean, 0.95)))
+    braking = np.nan_to_num(window_means(braked(recording).astype(np.float64), place, count))
+    rows &= braking == 0
+    rows[1:] &= braking[:-1] == 0
+    rows[:-1] &= braking[1:] == 0
     if rows.sum() < _LEAST:
         return None
     means = Means(place, starts, rows, change[rows], mean[rows], length=length)

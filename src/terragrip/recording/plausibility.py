@@ -16,6 +16,7 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.physics.slip import middle_speed
 from terragrip.recording.axles import axle_warnings, free_axle_warnings
+from terragrip.recording.brake import without_braked_torques
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings, replay_warnings
 from terragrip.recording.counted import counted_warnings
@@ -111,7 +112,7 @@ class _Log:
     @cached_property
     def as_measured(self) -> Recording:
         """The rows with the ground speed where its receiver is, as that of the positions."""
-        return averaged(self.whole, _FINEST)
+        return averaged(without_braked_torques(self.whole), _FINEST)
 
     @cached_property
     def rows(self) -> Recording:

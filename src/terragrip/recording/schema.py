@@ -20,6 +20,7 @@ CHANNELS = {
     "fuel_rate": "m^3/s",
     "drawbar_force": "N",
     "hitch_load": "N",  # vertical force of an implement on the hitch, down positive
+    "brake": "1",  # of a friction brake on the wheels, whose torque no drive torque contains: 0 released to 1
     "mass": "kg",  # of the whole machine, without anything towed
     "acceleration_x": "m/s^2",
     "acceleration_y": "m/s^2",

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.errors import InputError, nearest, suggestion
 from terragrip.recording import checks
+from terragrip.recording.brake import refuse_no_share
 from terragrip.recording.clock import LATEST, clock_index
 from terragrip.recording.columns import numbers, seconds, stamps_of, start_of, texts
 from terragrip.recording.frames import frame_of, in_si
@@ -271,6 +272,7 @@ class Recording(ByName):
         for force in ("drawbar_force", "hitch_load"):
             checks.require_hitch(vehicle, force, self.channels, self.source)
         checks.refuse_other_mass(vehicle, self.channels, self.source)
+        refuse_no_share(self.channels, self.source)
 
     def _like(self, column: str) -> str | None:
         """The unused column of the log that is named most like this one."""

@@ -18,6 +18,7 @@ TITLES = {
     "wheel_based_speed": "speed of the drive train, the wheels as one",
     "drawbar_force": "pull at the hitch, backward positive",
     "hitch_load": "vertical load on the hitch, down positive",
+    "brake": "brake, 0 released to 1 pressed",
     "mass": "mass of the whole machine, where it changes",
     "acceleration_x": "acceleration forward",
     "pitch": "pitch, nose up positive",

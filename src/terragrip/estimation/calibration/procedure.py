@@ -29,6 +29,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
+from terragrip.recording.brake import unbraked
 from terragrip.vehicle import Vehicle, require_vehicle
 
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
@@ -94,7 +95,7 @@ def calibrate(
     for log in logs:
         log.check_against(vehicle)
         _refuse_other_load(log, vehicle)
-    logs = [without_held(log) for log in logs]
+    logs = [unbraked(without_held(log)) for log in logs]
     quantities, unknown, (yaw_zero, yaw_std) = _zeros(logs, vehicle, sources)
     zeroed = Calibration(tuple(quantities), ()).apply(vehicle)
     completed = [completed_by_positions(_corrected(log, zeroed, yaw_zero)) for log in logs]
