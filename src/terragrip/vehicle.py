@@ -234,7 +234,7 @@ class Vehicle(Part):
     @cached_property
     def driven_radii(self) -> dict[str, float]:
         """Those of the driven wheels."""
-        return {wheel: self.radii[wheel] for wheel, on in zip(self.wheels, self.driven, strict=True) if on}
+        return {wheel: self.radii[wheel] for wheel in self.driven_wheels}
 
     @cached_property
     def wheel_inertia(self) -> Floats:
@@ -259,10 +259,15 @@ class Vehicle(Part):
         """Whether each wheel is driven (n,)."""
         return _frozen(np.array([axle.driven for axle in self.axles.values() for _ in axle.wheels]))
 
+    @cached_property
+    def driven_wheels(self) -> tuple[str, ...]:
+        """Names of the driven wheels, front to rear."""
+        return tuple(name for axle in self.axles.values() if axle.driven for name in axle.wheels)
+
     @property
     def free_wheels(self) -> tuple[str, ...]:
-        """The wheels that are not driven: their slip says nothing of the drive."""
-        return tuple(wheel for wheel, on in zip(self.wheels, self.driven, strict=True) if not on)
+        """The others: their slip says nothing of the drive."""
+        return tuple(wheel for wheel in self.wheels if wheel not in self.driven_wheels)
 
     def rolling_wheels(self, channels: Collection[str]) -> tuple[str, ...]:
         """The free wheels without a speed among ``channels``: they go as the ground does under them, without slip."""

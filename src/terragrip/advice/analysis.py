@@ -93,8 +93,9 @@ def advise_samples(
 
 def refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
     """InputError unless the table has the vehicle's driven wheels and axles, and one of them is driven."""
-    driven = [w for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
-    columns = [f"adhesion_{w}" for w in driven] + [f"vertical_load_{a}" for a in vehicle.axle_names]
+    columns = [f"adhesion_{w}" for w in vehicle.driven_wheels] + [
+        f"vertical_load_{a}" for a in vehicle.axle_names
+    ]
     lacking = next((name for name in columns if name not in estimates.names), None)
     if lacking or not vehicle.driven.any():
         problem = f"the estimates have no {lacking}" if lacking else "the vehicle drives no wheel"

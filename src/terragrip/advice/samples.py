@@ -82,11 +82,7 @@ class Samples:
 
 def driven_wheels(estimates: Estimates, vehicle: Vehicle) -> list[str]:
     """The driven wheels that the table has."""
-    return [
-        w
-        for w, drives in zip(vehicle.wheels, vehicle.driven, strict=True)
-        if drives and w in estimates.wheels
-    ]
+    return [wheel for wheel in vehicle.driven_wheels if wheel in estimates.wheels]
 
 
 def wheel_loads(estimates: Estimates, vehicle: Vehicle, wheels: Sequence[str]) -> Floats:

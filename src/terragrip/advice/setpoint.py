@@ -65,8 +65,7 @@ class SlipSetpoint:
         if not (speed > 0 and math.isfinite(speed)):
             raise InputError(f"the speed {speed:g} m/s is not forward", hint="give a positive speed in m/s")
         self.slip, self.speed, self.limits = slip, speed, limits or Limits()
-        radii, driven = vehicle.wheel_radius, vehicle.driven
-        self._radius = {w: float(r) for w, r, d in zip(vehicle.wheels, radii, driven, strict=True) if d}
+        self._radius = vehicle.driven_radii
         if not self._radius:
             raise InputError("the vehicle drives no wheel", hint="leave out 'driven: false' of one axle")
         self._wheels = tuple(self._radius)

@@ -113,20 +113,15 @@ class DrivenMachine:
             "dead_band": self.dead_band,
         }
 
-    @cached_property
-    def _wheels(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        pairs = list(zip(self.original.wheels, self.original.driven, strict=True))
-        return tuple(w for w, on in pairs if on), tuple(w for w, on in pairs if not on)
-
     @property
     def together(self) -> int:
         """How many wheels the driven one represents."""
-        return len(self._wheels[0])
+        return len(self.original.driven_wheels)
 
     @cached_property
     def frees_measured(self) -> bool:
         """Whether all free wheels' speeds are in the log."""
-        free = self._wheels[1]
+        free = self.original.free_wheels
         return bool(free) and all(f"wheel_speed_{w}" in self.channels for w in free)
 
     @cached_property
@@ -139,7 +134,7 @@ class DrivenMachine:
     def own_channels(self) -> tuple[str, ...]:
         """The channels of `vehicle` that the log's become."""
         own = [f"wheel_speed_{DRIVEN}", f"drive_torque_{DRIVEN}"]
-        own += [f"wheel_speed_{UNDRIVEN}"] * bool(self._wheels[1])
+        own += [f"wheel_speed_{UNDRIVEN}"] * bool(self.original.free_wheels)
         return (*own, *(n for n in self.channels if not n.startswith(_REPLACED)))
 
     @property
@@ -164,7 +159,7 @@ class DrivenMachine:
         """Channels of `vehicle`, and the driveline's torque, in the rows (n,) from ``before`` on of channels (before + n,) at ``time``."""
         driveline = self.original.driveline
         assert driveline is not None
-        driven, free = self._wheels
+        driven, free = self.original.driven_wheels, self.original.free_wheels
         if any(f"wheel_speed_{w}" in given for w in driven):
             speed = self._speed(given, driven, self.radius(DRIVEN))
         else:

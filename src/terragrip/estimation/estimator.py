@@ -349,9 +349,8 @@ class TractionEstimator:
 
 def default_channels(vehicle: Vehicle) -> tuple[str, ...]:
     """The columns that samples of this vehicle have at least: ground speed, and speeds and torques of driven wheels."""
-    torques = [f"drive_torque_{w}" for w, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
-    speeds = [name.replace("drive_torque", "wheel_speed") for name in torques]
-    return (*speeds, "ground_speed", *torques)
+    driven = vehicle.driven_wheels
+    return (*(f"wheel_speed_{w}" for w in driven), "ground_speed", *(f"drive_torque_{w}" for w in driven))
 
 
 def unusable(sample: Mapping[str, Any], names: Collection[str]) -> InputError:

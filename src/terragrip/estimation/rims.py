@@ -98,14 +98,10 @@ def calibrated_scale(vehicle: Vehicle) -> float | None:
         gain = vehicle.calibration.wheel_based_speed_gain
         return None if gain is None else 1 / gain
     result = vehicle.calibration.wheel_radius
-    driven = [
-        (wheel, data.radius)
-        for wheel, data, on in zip(vehicle.wheels, vehicle.wheel_data, vehicle.driven, strict=True)
-        if on
-    ]
-    if not all(wheel in result for wheel, _ in driven):
+    stated = {wheel: data.radius for wheel, data in zip(vehicle.wheels, vehicle.wheel_data, strict=True)}
+    if not all(wheel in result for wheel in vehicle.driven_wheels):
         return None
-    return float(np.mean([result[wheel] / radius for wheel, radius in driven]))
+    return float(np.mean([result[wheel] / stated[wheel] for wheel in vehicle.driven_wheels]))
 
 
 def at_zero(rim: Rim, zero: Zero) -> Rim:

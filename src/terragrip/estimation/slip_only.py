@@ -83,14 +83,13 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
 
 
 def _require_driven(log: Recording, vehicle: Vehicle) -> None:
-    driven = [wheel for wheel, on in zip(vehicle.wheels, vehicle.driven, strict=True) if on]
-    free = [wheel for wheel in log.wheels if wheel in vehicle.wheels and wheel not in driven]
+    free = [wheel for wheel in log.wheels if wheel in vehicle.free_wheels]
     if free and free == list(log.wheels):
         drive = "leave these out, for wheel_based_speed" if "wheel_based_speed" in log.channels else ""
         raise InputError(
             f"is missing: the log has speeds of free wheels alone ({', '.join(free)}), whose slip says nothing",
             file=log.source,
-            place=f"column wheel_speed_{driven[0]}",
+            place=f"column wheel_speed_{vehicle.driven_wheels[0]}",
             hint=drive or "name its column in a profile, or correct 'driven' in the vehicle file",
             page="vehicle#signals-that-are-missing",
         )

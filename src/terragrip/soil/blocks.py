@@ -204,9 +204,8 @@ class _Rows:
 
 def driven_wheels(vehicle: Vehicle) -> dict[str, str]:
     """The driven wheels and the axle of each; all wheels where none is driven."""
-    names = [vehicle.axle_names[k] for k in vehicle.wheel_axle]
-    result = {w: a for w, a, on in zip(vehicle.wheels, names, vehicle.driven, strict=True) if on}
-    return result or dict(zip(vehicle.wheels, names, strict=True))
+    driven = vehicle.driven_wheels or vehicle.wheels
+    return {w: name for name, axle in vehicle.axles.items() for w in axle.wheels if w in driven}
 
 
 def estimates_blocks(estimates: Estimates, rows: Bools | None = None, file: str | None = None) -> Blocks:

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terragrip import __version__
 from terragrip.errors import InputError
-from terragrip.estimation.engine import EVENTS
 from terragrip.ground.events import events
+from terragrip.live.links.studio import hello
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates
@@ -41,13 +40,8 @@ PATTERNS = (
 async def replayed(table: Estimates, speed: float, start: float) -> AsyncIterator[str | bytes]:
     """Play a table from `start` [s] at `speed` times its own pace; ends with the table."""
     names = [n for n in table.columns if _wanted(n)]
-    free = table.vehicle.free_wheels
-    hello = {
-        "kind": "hello", "version": __version__, "vehicle": table.vehicle.name, "columns": names, "wheels": list(table.wheels),
-        "driven": [wheel for wheel in table.wheels if wheel not in free], "events": list(EVENTS),
-        "replay": {"start": float(table.time[0]), "end": float(table.time[-1])},
-    }  # fmt: skip
-    yield json.dumps(hello)
+    first = hello(table.vehicle.name, table.columns, table.vehicle.free_wheels, names)
+    yield json.dumps({**first, "replay": {"start": float(table.time[0]), "end": float(table.time[-1])}})
     messages = [
         {"kind": e.kind, "source": "estimator", "time": e.start, "text": e.why} for e in events(table)
     ]

@@ -102,9 +102,7 @@ def _half_widths(table: Estimates) -> dict[str, float]:
         if quantity == "soil_resistance":
             names = ["soil_resistance"] if "soil_resistance" in table else []
         else:
-            driven = {w for w, on in zip(table.vehicle.wheels, table.vehicle.driven, strict=True) if on} | {
-                "drive"
-            }
+            driven = (*table.vehicle.driven_wheels, "drive")
             names = [f"{quantity}_{w}" for w in table.wheels if w in driven and f"{quantity}_{w}" in table]
         if names:
             found[quantity] = NORMAL_95 * float(

@@ -111,7 +111,7 @@ class CanSink:
         uri.options.setdefault("rate", RATE)
         self._database: Any = cantools.database.load_file(DBC)
         self._wheels = vehicle.wheels
-        self._driven = {w for w, d in zip(vehicle.wheels, vehicle.driven, strict=True) if d}
+        self._driven = vehicle.driven_wheels
         self._counter = 0
         self._change: tuple[float, float] | None = None  # time and probability of the last one
 

@@ -29,13 +29,22 @@ from terragrip.live.uri import Uri, is_loopback
 from terragrip.prometheus_text import CONTENT_TYPE
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+    from collections.abc import AsyncGenerator, Callable, Collection, Mapping, Sequence
 
     from terragrip.live.monitor import Answers
     from terragrip.vehicle import Vehicle
 
 OPTIONS = ("rate", "columns", "format", "token", "vehicle")
 _LOOK = 0.2  # s between two looks for a first vehicle
+
+
+def hello(vehicle: str, every: Collection[str], free: Collection[str], sent: Sequence[str]) -> dict[str, Any]:
+    """The first message: of a vehicle by name, ``every`` column of its estimates, its ``free`` wheels, and the columns ``sent``."""
+    wheels = wheels_with("slip", every)
+    return {
+        "kind": "hello", "version": __version__, "vehicle": vehicle, "columns": list(sent), "wheels": list(wheels),
+        "driven": [w for w in wheels if w not in free], "events": list(EVENTS),
+    }  # fmt: skip
 
 
 class StudioSink:
@@ -170,25 +179,20 @@ class Broadcast:
             hint = suggestion(name, vehicles, "look at /health/ready")
             raise InputError(f"no vehicle {name[:40]!r} sends", hint=hint)
         vehicle, every, free = vehicles[name]
-        wheels = wheels_with("slip", every)
-        hello = {
-            "kind": "hello", "version": __version__, "vehicle": vehicle,
-            "columns": [n for n in every if columns is None or columns.wants(n)],
-            "wheels": list(wheels), "driven": [w for w in wheels if w not in free], "events": list(EVENTS),
-        }  # fmt: skip
-        return name, {**hello, "name": name, "vehicles": sorted(vehicles)} if name else hello
+        first = hello(vehicle, every, free, [n for n in every if columns is None or columns.wants(n)])
+        return name, {**first, "name": name, "vehicles": sorted(vehicles)} if name else first
 
     async def subscribe(self, request: str = "/") -> AsyncGenerator[str | bytes]:
         """The frames for a client that asked for ``/?format=binary&rate=20&columns=slip_*``; raises InputError on any other."""
         uri = Uri.parse(f"studio://127.0.0.1{request}", {"studio": OPTIONS}, "sink")
         binary = uri.choice("format", ("json", "binary")) == "binary"
         client = Outbox(uri)
-        name, hello = await self._hello(uri, client.columns)
-        columns = hello["columns"]
+        name, first = await self._hello(uri, client.columns)
+        columns = first["columns"]
         packer = struct.Struct(f"<{3 + len(columns)}d")
         self._clients.append((name, client))
         try:
-            yield json.dumps(hello)
+            yield json.dumps(first)
             while True:
                 message = await client.get()
                 row = message.row
