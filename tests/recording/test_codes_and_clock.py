@@ -102,6 +102,7 @@ def test_what_a_machine_can_have_is_no_code(name: str, value: float) -> None:
         ("ground_speed", 65.535 / 3.6),
         ("drive_torque_fl", 655.35),
         ("drive_torque_fl", -1.0),
+        ("wheel_speed_fl", 255.0),
         *(
             ("drive_torque_fl", code)
             for code in (655.34, -655.35, 327.67, -327.67, -327.68, 999.9, -999.9, -999.99, 999.99)
@@ -176,6 +177,13 @@ def test_a_drive_of_two_starts_tells_of_its_clock() -> None:
     columns = {"time": columns["time"] / 60, "ground_speed": speed + 0.01 * draws.standard_normal(len(speed))}
     columns |= {f"wheel_speed_{w}": speed / RADIUS + 0.02 * draws.standard_normal(len(speed)) for w in WHEELS}
     assert any("time may not be in seconds" in note for note in notes_on(columns))
+
+
+@pytest.mark.parametrize("first", [45415.4, 739376.4])
+def test_days_of_a_spreadsheet_or_of_matlab_are_known_by_their_number(first: float) -> None:
+    """The shortest unit that explains such changes was hours: with it, the drive is 24 times too fast."""
+    columns = drive()
+    assert any("unit: d}" in note for note in notes_on(columns | {"time": first + columns["time"] / 86400}))
 
 
 def test_positions_that_outrun_the_way_of_a_gentle_drive_tell_of_the_clock() -> None:

@@ -71,11 +71,22 @@ def test_zeros_for_values_that_were_not_there_are_named(name: str) -> None:
     values = np.where(np.arange(len(TIME)) % 10 == 3, 0.0, log().channels[name])
     (note,) = dropout_warnings(log(**{name: values}))
     assert note.startswith(f"{name} is 0 in ")
-    assert "samples between others at speed, while other speeds go on" in note
+    assert "samples between others at speed, as no vehicle drives" in note
+
+
+def test_holes_that_a_join_of_unlike_rates_filled_with_zeros_are_named() -> None:
+    """All speeds are 0 in the same rows: the notes were of units and gear ratios."""
+    time = np.arange(0.0, 30.0, 0.01)
+    filled = np.where(np.arange(len(time)) % 2 == 1, 0.0, 1.0)
+    speeds = {
+        n: v * filled for n, v in (("ground_speed", 0.5), ("wheel_speed_l", 2.5), ("wheel_speed_r", 2.5))
+    }
+    (note,) = dropout_warnings(Recording(time, speeds))
+    assert "ground_speed is 0 in 1499 samples between others at speed" in note
 
 
 def test_a_vehicle_that_stops_for_a_moment_has_no_zeros_that_were_not_there() -> None:
-    rows = np.arange(len(TIME)) % 40 == 3
+    rows = np.arange(len(TIME)) % 40 // 4 == 1  # .2 s: in a row no vehicle stops and starts
     still = {
         n: np.where(rows, 0.0, log().channels[n]) for n in ("ground_speed", "wheel_speed_l", "wheel_speed_r")
     }

@@ -150,6 +150,10 @@ def _as_object(name: str, row: int, cell: object) -> Callable[[Columns], Columns
             lambda c: {**c, "longitude": 1130.02 + 1e-4 * c["time"]},
             "column longitude: is 1130.02, and most of its values are no longitude in degrees; give it in degrees: degrees and minutes",
         ),
+        (
+            lambda c: {**c, "latitude": np.where(np.arange(6000) % 20, -9999.0, 48 + 1e-6 * c["time"])},
+            "column latitude: is -9999, and most of its values are no latitude in degrees; if it stands for 'not measured', leave",
+        ),
         (lambda c: {k: v[:0] for k, v in c.items()}, "the table is empty"),
         (lambda c: {}, "there are no columns"),
         (lambda c: {**c, "pitch": np.zeros(3)}, "column pitch: has 3 rows, the first column 6000"),
@@ -164,6 +168,24 @@ def test_refusal(columns: Columns, change: Callable[[Columns], Any], message: st
         Recording.from_frame(change(columns), source="log.csv")
     assert str(caught.value).startswith(f"log.csv: {message}")
     assert caught.value.hint
+
+
+def test_rows_without_a_fix_have_no_position(columns: Columns) -> None:
+    """A receiver's 0, 0 was 5600 km from the field: 'time may not be in seconds', and a map reached to Africa."""
+    fix = columns["time"] > 5
+    places = {"latitude": np.where(fix, 51.0, 0.0), "longitude": np.where(fix, 13.0, 0.0)}
+    recording = Recording.from_frame({**columns, **places})
+    assert np.isnan(recording["latitude"][~fix]).all()
+    assert (recording["longitude"][fix] == 13.0).all()
+    assert (
+        "Rows whose latitude and longitude are both 0 are without a fix: they have no position."
+        in recording.notes
+    )
+    assert np.count_nonzero(places["latitude"]) == fix.sum()  # the user's table is as it was
+    alone = {"latitude": np.zeros(6000)}
+    assert (Recording.from_frame({**columns, **alone})["latitude"] == 0.0).all()
+    on_the_equator = {"latitude": np.zeros(6000), "longitude": np.full(6000, 13.0)}
+    assert (Recording.from_frame({**columns, **on_the_equator})["latitude"] == 0.0).all()
 
 
 @pytest.mark.parametrize(

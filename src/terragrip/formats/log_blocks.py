@@ -160,7 +160,8 @@ def _checked(
             raise InputError(
                 "holds dates and numbers", file=log.source, place=f"column {TIME}", hint="give one of them"
             )
-        block, _ = Recording.of_block(columns, log.source, first_row=first, after=after)
+        block, remarks = Recording.of_block(columns, log.source, first_row=first, after=after)
+        notes += remarks
         silent -= {
             name for name in silent & block.channels.keys() if not np.isnan(block.channels[name]).all()
         }

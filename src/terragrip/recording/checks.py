@@ -285,7 +285,10 @@ def refuse_place(name: str, values: Floats, source: str | None, channel: str | N
     hint = "give it in degrees: whole numbers of 1e-7 degrees by 'scale: 1e-7' in a profile"
     if not np.all(known == np.round(known)) and known.max() < 100 * limit:
         hint = "give it in degrees: degrees and minutes (ddmm.mmmm) as dd + mm.mmmm/60"
-    problem = f"is {places[0]:.10g}, and most of its values are no {channel or name} in degrees"
+    beyond = places[known > limit]
+    if not np.ptp(beyond):
+        hint = f"if it stands for 'not measured', leave these cells empty, or write 'invalid: [{beyond[0]:.10g}]' in a profile"
+    problem = f"is {beyond[0]:.10g}, and most of its values are no {channel or name} in degrees"
     raise InputError(problem, file=source, place=f"column {name}", hint=hint, page="formats#in-a-profile")
 
 

@@ -33,7 +33,7 @@ _CODES, _TIMES = 3, 3  # different values, and how often each is there at least
 _BEYOND = 5.0  # times all others
 _MOST = 0.5  # of a channel: where more is impossible, its unit is wrong
 # 65534: J1939's "error"; -32768: the lowest of two bytes
-_USED = (9999.0, 99999.0, 32767.0, 65535.0, 65534.0, -9999.0, -99999.0, -32767.0, -65535.0, -32768.0)
+_USED = (255.0, 9999.0, 99999.0, 32767.0, 65535.0, 65534.0, -9999.0, -99999.0, -32767.0, -65535.0, -32768.0)
 _SHORT, _FEWEST = 3, 5  # rows at such a value, and how often
 _LEAP = 5.0  # standard deviations, and steps, of what single samples differ from their neighbours
 _SLOWEST = 0.15  # s between samples: within more a machine may stop and go

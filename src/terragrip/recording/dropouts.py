@@ -11,6 +11,7 @@ from terragrip.recording.held import known_part
 from terragrip.recording.lag import measured
 from terragrip.recording.mechanics import Means
 from terragrip.recording.noise import white_noise
+from terragrip.recording.pace import GRIP
 from terragrip.recording.pulls import PULL
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names, speed_names
@@ -164,10 +165,12 @@ def _blinks(recording: Recording) -> list[str]:
         known = [known_part(recording.time, v) for v in (rims if name == "ground_speed" else [ground])]
         other = np.mean([np.abs(np.interp(when, *one)) for one in known], axis=0)
         goes_on = other[first] > _GOES_ON * np.maximum(other[first - 1], other[after])
+        if name == "ground_speed":  # all speeds are 0 where a join of unlike rates filled its holes
+            goes_on |= 2 * around > GRIP * (when[after] - when[first - 1])
         count = int((after - first)[short & goes_on].sum())
         if count >= _FEWEST:
             notes.append(
-                f"{name} is 0 in {count} samples between others at speed, while other speeds go on: zeros for values that were not there. "
+                f"{name} is 0 in {count} samples between others at speed, as no vehicle drives: zeros for values that were not there. "
                 "Leave these cells empty (in a profile 'invalid: [0]', where no stop matters)."
             )
     return notes

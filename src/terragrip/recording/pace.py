@@ -8,6 +8,7 @@ import numpy as np
 
 from terragrip.arrays import Floats, Ints
 from terragrip.physics.geodesy import metres_of
+from terragrip.recording.columns import SPREADSHEET_1970
 from terragrip.recording.held import measured_part
 from terragrip.recording.lag import Lag, lag_within
 from terragrip.recording.noise import white_noise
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
     from terragrip.vehicle import Vehicle
 
-_GRIP = 15.0  # m/s²: no tyre or track on the ground gives as much
+GRIP = 15.0  # m/s²: no tyre or track on the ground gives as much
 _LAGS = (4, 16, 64)  # rows over which a speed changes
 _OFTEN = 0.99  # of the changes are slower (right logs: by 2.5 m/s² at most, comma2k19's car among them)
 _ENOUGH = 4000  # rows that are examined
@@ -45,9 +46,9 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         return []
     time, speed = recording.time, filled(recording.time, ground)
     changes = _changes(time, speed, rims)
-    if changes > _GRIP:
+    if changes > GRIP:
         return [
-            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_clock(changes / _GRIP)}."
+            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_clock(changes / GRIP, time)}."
         ]
     rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
     some = rows[:: max(1, len(rows) // _ENOUGH)]
@@ -55,16 +56,17 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     way = max(_way(time[some], speed[some]), _way(time[some], _mean(rims, some)))
     spread = _spread(recording, rows)
     if spread > max(_SPREAD, _OUTRUN * way):
-        clock = _clock(spread / max(_OUTRUN * way, 1e-9))
+        clock = _clock(spread / max(_OUTRUN * way, 1e-9), time)
         return [
             f"The positions lie {spread:.4g} m apart, where ground and wheels drove {way:.4g} m: {clock}."
         ]
     return []
 
 
-def _clock(factor: float) -> str:
-    """What to write where time runs too fast by ``factor`` at least: the shortest unit that explains it."""
-    unit = next((unit for unit in _LONGER if factor_to(unit, "s") >= factor), _LONGER[-1])
+def _clock(factor: float, time: Floats) -> str:
+    """What to write where time runs too fast by ``factor`` at least: the shortest unit that explains it, of a date's number a day."""
+    shortest = next((unit for unit in _LONGER if factor_to(unit, "s") >= factor), _LONGER[-1])
+    unit = "d" if time[0] > SPREADSHEET_1970 and time[-1] < time[0] + 1 else shortest
     return f"time may not be in seconds: give its unit in a profile, 'time: {{from: ..., unit: {unit}}}'"
 
 
@@ -100,10 +102,9 @@ def drift_warnings(recording: Recording) -> list[str]:
 def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence where the ground speed is made of the driven wheels' speeds: slip is then 0 by construction."""
     ground = recording.channels.get("ground_speed")
-    driven = [w for w, own in zip(vehicle.wheels, vehicle.driven, strict=True) if own]
-    columns = [recording.channels.get(f"wheel_speed_{w}") for w in driven]
+    columns = [recording.channels.get(f"wheel_speed_{w}") for w in vehicle.driven_wheels]
     known = [c for c in columns if c is not None]
-    if ground is None or not known or len(known) < len(driven):
+    if ground is None or not known or len(known) < len(columns):
         return []
     rows = np.flatnonzero(np.isfinite(ground) & np.isfinite(known).all(axis=0))
     rows = rows[:: max(1, len(rows) // _ENOUGH)]

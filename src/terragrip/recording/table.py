@@ -165,6 +165,13 @@ class Recording(ByName):
                 channels[name] = numbers(name, column, time, source)
                 checks.refuse_infinite(name, channels[name], time, source, first_row=first_row)
                 checks.refuse_place(name, channels[name], source)
+        north, east = (channels.get(name) for name in checks.PLACES)
+        nowhere = np.zeros(0) if north is None or east is None else (north == 0.0) & (east == 0.0)
+        if nowhere.any():
+            remarks.append(
+                "Rows whose latitude and longitude are both 0 are without a fix: they have no position."
+            )
+            channels |= {name: np.where(nowhere, np.nan, channels[name]) for name in checks.PLACES}
         return cls(time, channels, labels, source), remarks
 
     @property
