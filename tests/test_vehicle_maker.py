@@ -165,6 +165,21 @@ def test_the_command_writes_the_file_says_what_it_costs_and_keeps_what_is_there(
     assert out.read_text() == before
 
 
+def test_a_number_far_from_what_is_typical_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """'6.200 kg', as a German writes 6200 kg, was a tractor of 6.2 kg with the lengths of a toy, without a word."""
+    words = ["new", "vehicle", "--class", "tractor-4wd", "-o"]
+    assert main([*words, str(tmp_path / "v.yaml"), "--mass", "6.200 kg"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "mass 6.2 kg is far from what is typical of the class, 6000 ± 2400 kg: is the unit right, and the point"
+        in said
+    )
+    assert main([*words, str(tmp_path / "w.yaml"), "--mass", "6200 kg", "--slope", "3 deg"]) == 0
+    assert "far from" not in capsys.readouterr().out
+
+
 def test_on_a_terminal_it_asks_and_asks_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     answers = iter(["tractor", "4", "wheel-speeds", "", "110 furlong", "eleven", "11 cm"])
     asked: list[str] = []

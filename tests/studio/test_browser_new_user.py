@@ -355,10 +355,14 @@ def test_of_several_vehicles_none_is_taken_for_the_logs(
     """The first by its name would estimate the robot's log with a tractor's mass, and look as well as the right one."""
     for name in ("a.parquet", "b.parquet"):
         (folder / name).write_bytes((made / "recording.parquet").read_bytes())
-    for name in ("big.yaml", "robot.yaml"):
-        (folder / name).write_bytes((made / "vehicle.yaml").read_bytes())
+    (folder / "big.yaml").write_bytes((made / "vehicle.yaml").read_bytes())
     page.goto(f"{served.url}/#/start?log=a.parquet")
+    page.wait_for_selector("#only-vehicle:has-text('no other vehicle file')")
+    assert page.input_value("#wizard-vehicle") == "big.yaml"
+    (folder / "robot.yaml").write_bytes((made / "vehicle.yaml").read_bytes())
+    page.reload()
     page.wait_for_selector("#wizard-found:has-text('choose the vehicle')")
+    assert page.is_hidden("#only-vehicle")
     assert page.is_disabled("#wizard-go")
     page.select_option("#wizard-vehicle", "big.yaml")
     page.wait_for_selector("text=ready to estimate")

@@ -285,11 +285,14 @@ def _said(made: Made) -> str:
     lines.append(
         "Computed, not measured: this machine at work, with one uncertainty at a time through the filter (docs/vehicle.md)."
     )
-    lacking = [
-        f.name
-        for f in fields(made.machine, made.signals, made.known)
-        if f.needed and f.name not in made.known
+    asked = fields(made.machine, made.signals, made.known)
+    lines += [
+        f"{field.name} {made.known[field.name]:g} {field.unit} is far from what is typical of the class, "
+        f"{field.assumption.partition(': ')[2]}: is the unit right, and the point a decimal point?"
+        for field in asked
+        if field.is_far(made.known)
     ]
+    lacking = [f.name for f in asked if f.needed and f.name not in made.known]
     if made.torque_at == "motor":
         lines.append("Torques at the motor: give each 'scale: RATIO', the gear ratio, in the log's profile.")
         lines.append(

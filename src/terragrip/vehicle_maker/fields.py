@@ -40,6 +40,11 @@ class Field:
     needed: bool = False
     is_spread: bool = False
 
+    def is_far(self, known: Mapping[str, float]) -> bool:
+        """Whether its number [SI] among those ``known`` is a tenth of what is typical, or ten times that: 6.200 kg of a tractor."""
+        typical = 0.0 if self.typical is None or self.is_spread else self.typical.value
+        return typical > 0 and not typical / 10 < known.get(self.name, typical) < 10 * typical
+
     @property
     def assumption(self) -> str:
         """What is assumed where it is not known: ``wheelbase: 2.68 ± 0.395 m``, or of a spread ``slope: ± 0.0175 rad``."""

@@ -152,7 +152,7 @@ export const page: Page = (main, { notices, query }) => {
 
   function tell(message: Said): void {
     if (message.source !== undefined && message.text !== undefined) {
-      said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` ${instant(message.time)}`, message.text ? `: ${message.text}` : ""));
+      said.prepend(h("li", {}, h("strong", {}, message.kind), message.time === null ? "" : ` at ${instant(message.time)}`, message.text ? `: ${message.text}` : ""));
       while (said.children.length > 6) said.lastElementChild?.remove();
       if (message.kind in WARNING) warn(message.kind, message.text);
     } else if (message.kind === "setpoint") {

@@ -28,6 +28,7 @@ export class LogPage {
   private next = h("div");
   private profile = "";
   private vehicle = "";
+  private isOnly = false; // the vehicle is taken for want of another
   private preview: Preview | undefined;
   private mapping: Mapping | undefined;
   private maker: MachineMaker | undefined;
@@ -109,6 +110,7 @@ export class LogPage {
     this.profile = own.map((path) => there("profile", path)).find(Boolean) ?? "";
     const vehicle = there("vehicle", bound.vehicle) || there("vehicle", used("--vehicle")) || there("vehicle", `${stemOf(this.log)}-vehicle.yaml`);
     this.vehicle = vehicle || this.onlyVehicle();
+    this.isOnly = !vehicle && this.vehicle !== "";
     this.mapping = new Mapping(this.log, (profile) => void this.keptProfile(profile));
     this.drawColumns(false); // that the log is read: a long one takes a while
     this.preview = await this.mapping.open(this.free(`${stemOf(this.log)}-profile`, ".yaml"), this.profile);
@@ -190,14 +192,17 @@ export class LogPage {
     const select = choice("wizard-vehicle", vehicles, this.vehicle, vehicles.length ? "choose the log's vehicle" : "no vehicle file yet: make one below");
     select.addEventListener("change", () => {
       this.vehicle = select.value;
+      only.remove();
       bind(this.key, { vehicle: this.vehicle });
       void this.parts().then(() => this.inspect());
     });
     const maker = (this.maker = new MachineMaker(this.free(`${stemOf(this.log)}-vehicle`, ".yaml"), this.mapping?.signals ?? "torque", (path) => void this.keptVehicle(path)));
+    const only = h("p", { class: "hint", id: "only-vehicle", hidden: !this.isOnly }, "The folder has no other vehicle file. If the log is of another machine, make that one’s below.");
     const command = h("div");
     maker.element.addEventListener("kept", (event) => fill(command, h("details", {}, h("summary", {}, "Command line that makes this vehicle file"), (event as CustomEvent<HTMLElement>).detail)));
     refill(this.machine, [
       row("Vehicle", select),
+      only,
       h("details", { open: !vehicles.length, id: "make-machine" }, h("summary", {}, "Make a vehicle file from known numbers"), maker.element),
       command,
     ]);
@@ -206,6 +211,7 @@ export class LogPage {
   private async keptVehicle(path: string): Promise<void> {
     await this.reload();
     this.vehicle = path;
+    document.getElementById("only-vehicle")?.remove();
     bind(this.key, { vehicle: path });
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement;
     fill(select, this.of("vehicle").map((name) => h("option", { value: name, selected: name === path }, name)));

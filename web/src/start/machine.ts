@@ -19,6 +19,8 @@ interface Field {
   needed: boolean;
   is_spread: boolean;
   known: number | null;
+  /** Known, and far from what is typical. */
+  is_far: boolean;
 }
 
 interface Made {
@@ -188,7 +190,7 @@ export class MachineMaker {
       if (input) input.placeholder = typical(field);
       const line = this.element.querySelector(`#typical-${field.name}`);
       if (!line) continue;
-      const [far, said] = [isFar(field), field.known === null ? "" : `${digits(field.known)} ${field.unit === "1" ? "" : field.unit}`];
+      const [far, said] = [field.is_far, field.known === null ? "" : `${digits(field.known)} ${field.unit === "1" ? "" : field.unit}`];
       line.className = far ? "bad" : "hint";
       line.textContent = said ? said + (far ? `: far from what is typical of the class, ${typical(field)}. Is the unit right, and the point a decimal point?` : "") : field.source === null ? "" : `typical ${typical(field)}; ${field.source}`;
     }
@@ -222,11 +224,6 @@ export class MachineMaker {
     this.saved(kept.path);
     this.element.dispatchEvent(new CustomEvent("kept", { detail: commandLine(kept.command) }));
   }
-}
-
-/** Whether a number is a tenth of what is typical, or ten times that: 6.200 kg of a tractor. */
-function isFar({ value, known, is_spread }: Field): boolean {
-  return !is_spread && known !== null && value !== null && value > 0 && !(known > value / 10 && known < 10 * value);
 }
 
 function typical(field: Field): string {

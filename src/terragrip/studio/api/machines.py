@@ -70,6 +70,7 @@ def make_machine(wanted: Machine) -> dict[str, Any]:
                     "needed": field.needed,
                     "is_spread": field.is_spread,
                     "known": made.known.get(field.name),
+                    "is_far": field.is_far(made.known),
                 }
                 for field in asked
             ],
