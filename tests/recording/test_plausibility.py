@@ -86,7 +86,7 @@ def test_standstill_and_backward_say_nothing(columns: Columns, vehicle: Vehicle)
     assert unit_warnings(Recording.from_frame(still), vehicle) == []
     (note,) = unit_warnings(scaled(columns, "ground_speed", 0.0), vehicle)
     assert "ground_speed (0) never changes while the wheels turn" in note
-    backward = {n: -v if "speed" in n else v for n, v in columns.items()}
+    backward = {n: -v if "speed" in n or "torque" in n else v for n, v in columns.items()}
     assert unit_warnings(Recording.from_frame(backward), vehicle) == []
 
 

@@ -64,7 +64,8 @@ def against_warnings(recording: Recording) -> list[str]:
 
 
 def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """A sentence where the ground speed stays positive while the wheels turn backward, or where both do and a gyroscope shows it."""
+    """A sentence where the ground speed stays positive while the wheels turn backward, or where both do and a gyroscope shows it, and where
+    both go against the torques."""
     channels, time = recording.channels, recording.time
     known = [w for w in vehicle.wheels if np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any()]
     ground = channels.get("ground_speed")
@@ -82,6 +83,12 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         ]
     if not moving.any():
         return []
+    torques = [filled(time, v) for n, v in channels.items() if n.startswith("drive_torque_")]
+    if torques and np.mean((back & (speed < 0))[moving]) > _ALIKE and np.mean(np.sum(torques, 0)[moving]) > 0:
+        return [
+            "Wheels and ground speed go backward all the way while the drive torques push forward: nothing drives so. Write 'sign: -1' for "
+            "these speeds in the profile, or, if it drove backward, for the torques."
+        ]
     if np.mean(back[moving]) >= _SHARE:
         ahead = moving & (rim > 0)
         if ahead.any() and np.mean(speed[back] > 0) > _ALIKE and np.mean(speed[ahead] > 0) > _ALIKE:
