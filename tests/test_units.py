@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
 import pint
 import pytest
 from hypothesis import given
@@ -82,6 +83,14 @@ def test_quantity(text: str, si_unit: str, expected: float) -> None:
 
 
 @pytest.mark.parametrize(
+    "value", [np.int64(2), np.float32(2), pint.Quantity(200, "cm"), pint.Quantity(2.0, "m")]
+)
+def test_numbers_of_numpy_and_quantities_of_pint_are_numbers(value: object) -> None:
+    """'np.int64(2) is not a number', as a cell of a DataFrame is one."""
+    assert quantity(value, "m") == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
     ("value", "si_unit", "problem"),
     [
         ("139 N", "kg", "'N' measures a force, where a mass is needed"),
@@ -100,6 +109,7 @@ def test_quantity(text: str, si_unit: str, expected: float) -> None:
         (10**400, "m", "not a finite number"),
         ("139 2 kg", "kg", "not a unit"),
         (True, "m", "not a number"),
+        (np.True_, "m", "not a number"),
         ([1], "m", "not a number"),
         ("1 m^99999", "m", "not a unit"),
         ("1 9**9**9**9**9", "m", "not a unit"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from numbers import Real
 
 Dimension = tuple[int, int, int, int]  # powers of kg, m, s, A
 
@@ -146,7 +147,8 @@ def factor_to(text: str, si_unit: str) -> float:
 def quantity(value: object, si_unit: str) -> float:
     """Read a number (already in ``si_unit``) or a text with a unit; raises UnitError on anything else."""
     example = f"write e.g. '1.5 {si_unit}'" if si_unit != "1" else "write a number such as 0.02"
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    value = str(value) if hasattr(value, "magnitude") else value  # pint
+    if isinstance(value, bool) or not isinstance(value, Real | str):
         raise UnitError(f"{_short(value)} is not a number", example)
     if isinstance(value, str):
         match = _NUMBER.match(value)

@@ -77,6 +77,14 @@ def test_a_unit_that_a_table_in_memory_states_is_converted(table: Any) -> None:
     np.testing.assert_allclose(got["ground_speed"], KMH / 3.6, rtol=1e-6)
 
 
+def test_blanks_around_a_name_are_no_part_of_it() -> None:
+    """Of 'time, ground_speed' pandas makes ' ground_speed', which was another column than 'ground_speed'."""
+    log = beside().rename(columns=lambda name: f" {name} ")
+    log.attrs["units"] = {" ground_speed ": "km/h"}
+    np.testing.assert_allclose(Recording.from_frame(log)["ground_speed"], KMH / 3.6)
+    np.testing.assert_allclose(Recording.from_frame(pa.Table.from_pandas(log))["ground_speed"], KMH / 3.6)
+
+
 def test_a_unit_behind_a_name_counts_before_one_that_attrs_kept() -> None:
     log = LOG.assign(ground_speed=1.0).rename(columns={"ground_speed": "ground_speed [km/h]"})
     log.attrs["units"] = {"ground_speed": "m/s", "ground_speed [km/h]": "m/s"}

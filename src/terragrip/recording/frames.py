@@ -79,7 +79,7 @@ def units_of_fields(schema: Any) -> dict[str, str]:
         result = _texts(pandas["attributes"]["units"])
     except (ValueError, KeyError, TypeError):  # damaged, or none stated
         result = {}
-    units = {field.name: (field.metadata or {}).get(b"unit", b"") for field in schema}
+    units = {field.name.strip(): (field.metadata or {}).get(b"unit", b"") for field in schema}
     return result | {name: unit.decode("utf-8", "replace") for name, unit in units.items() if unit}
 
 
@@ -115,7 +115,7 @@ def _texts(units: Any) -> dict[str, str]:
     """Units by column as texts, degrees_north as degrees; none of anything but a mapping."""
     if not isinstance(units, Mapping):
         return {}
-    return {str(n): re.sub("_(north|east)$", "", str(u)) for n, u in units.items() if u is not None}
+    return {str(n).strip(): re.sub("_(north|east)$", "", str(u)) for n, u in units.items() if u is not None}
 
 
 def _variables(table: Mapping[Any, Any]) -> list[tuple[Any, Any]]:
@@ -160,14 +160,15 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
         hint = "give what tg.read(path) returns, a DataFrame or a dict of arrays"
         raise InputError(problem, file=source, hint=f"give what its .{lazy}() returns" if lazy else hint)
     columns: dict[str, npt.NDArray[Any]] = {}
-    for name, values in pairs:
-        if str(name) in columns:
+    for label, values in pairs:
+        name = str(label).strip()
+        if name in columns:
             raise InputError("occurs twice", file=source, place=f"column {name}", hint="keep one of them")
-        column = _array(str(name), values, source)
+        column = _array(name, values, source)
         if columns and len(column) != len(next(iter(columns.values()))):
             problem = f"has {len(column)} rows, the first column {len(next(iter(columns.values())))}"
             raise InputError(problem, file=source, place=f"column {name}", hint="give columns of one length")
-        columns[str(name)] = column
+        columns[name] = column
     return columns
 
 
