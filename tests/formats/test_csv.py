@@ -584,6 +584,20 @@ def test_values_without_a_name_are_counted_and_an_empty_column_or_an_index_is_no
     assert not any("no name" in note for note in read(log).notes)
 
 
+def test_dates_of_an_index_that_pandas_wrote_without_a_name_are_the_time(tmp_path: Path) -> None:
+    """They were left out, and `inspect` had no time to propose; an index of row numbers is none."""
+    log = tmp_path / "log.csv"
+    index = pd.date_range("2026-03-01 10:00", periods=30, freq="100ms", tz="Europe/Berlin")
+    table = pd.DataFrame({"ground_speed": 1.0, "wheel_speed_l": 2.0}, index=index)
+    table.to_csv(log)
+    recording = read(log)
+    assert recording.time.tolist() == pytest.approx(np.arange(30) / 10)
+    assert recording.start == index[0].timestamp()
+    table.reset_index(drop=True).to_csv(log)
+    with pytest.raises(InputError, match="column time: is missing"):
+        read(log)
+
+
 def test_names_with_blanks_hide_no_tab_where_cells_are_missing(tmp_path: Path) -> None:
     """Blanks made more cells numbers than tabs did."""
     names = ["time", "ground speed", "wheel speed fl", "wheel speed fr"]

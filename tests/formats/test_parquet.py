@@ -31,6 +31,30 @@ def test_whole_file(tmp_path: Path, log: pd.DataFrame) -> None:
     assert recording.notes == ("Columns that are not used: extra.",)
 
 
+@pytest.mark.parametrize("name", [None, "stamp"])
+def test_a_clock_that_is_the_frames_index_is_the_time(
+    tmp_path: Path, log: pd.DataFrame, name: str | None
+) -> None:
+    """As in the frame itself: the file of the same frame was refused for want of a time."""
+    stamps = pd.Timestamp("2026-03-01 10:00", tz="UTC") + pd.to_timedelta(log["time"], unit="s")
+    frame = log.drop(columns="time").set_index(pd.DatetimeIndex(stamps, name=name))
+    frame.to_parquet(tmp_path / "log.parquet")
+    recording = read(tmp_path / "log.parquet")
+    np.testing.assert_allclose(recording.time, log["time"] - log["time"][0], atol=1e-6)
+    assert recording.start == stamps[0].timestamp()
+    if name:  # a profile may name it as the frame does
+        profile = Profile.from_dict(
+            {
+                "time": {"from": name, "zero": "first"},
+                "channels": {n: n for n in ("ground_speed", "wheel_speed_l")},
+            }
+        )
+        np.testing.assert_allclose(read(tmp_path / "log.parquet", profile).time, recording.time, atol=1e-6)
+    frame.reset_index(drop=True).to_parquet(tmp_path / "rows.parquet")
+    with pytest.raises(InputError, match="column time: is missing"):
+        read(tmp_path / "rows.parquet")
+
+
 def test_types_become_numbers_and_labels(tmp_path: Path, log: pd.DataFrame) -> None:
     log["soil"] = log["soil"].astype("category")
     log["ground_speed"] = log["ground_speed"].astype("float32").astype("Float32").where(log.index != 3)

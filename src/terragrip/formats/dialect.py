@@ -11,9 +11,11 @@ from itertools import islice, zip_longest
 
 from terragrip.errors import InputError
 from terragrip.recording.frames import WITH_UNIT, names_and_units
+from terragrip.recording.schema import TIME
 from terragrip.text import HEAD
 from terragrip.thousands import has_thousands, unit_in
 from terragrip.units import is_common
+from terragrip.written_times import times_of
 
 _SEPARATORS = (",", ";", "\t", "|")
 _COMMENTS = (b"#", b"%", b"//")
@@ -76,6 +78,9 @@ def detect(data: bytes, source: str) -> Dialect:
         if (unit := _unit_in_all(column)) and units.get(name, unit) == unit
     }
     units |= {names[k]: unit for k, unit in in_cells.items()}
+    dates = list(columns[0]) if columns and not names[0] and TIME not in names else []
+    if any(dates) and times_of(dates) is not None:
+        names = (TIME, *names[1:])  # pandas' index
     others = zip(columns[1:], names[1:], strict=False)  # the first may be an index
     unnamed = sum(any(column) for column, name in others if not name)
     return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells, unnamed)

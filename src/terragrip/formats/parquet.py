@@ -12,6 +12,7 @@ from terragrip.formats.registry import Format
 from terragrip.formats.table import from_arrow
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
 from terragrip.recording.frames import names_and_units, units_of_fields
+from terragrip.recording.schema import TIME
 from terragrip.recording.survey import ROWS
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ def parquet_on_disk(path: str) -> TableOnDisk:
         spelt = dict(zip(named, whole, strict=True))
         units = {name: unit for name in named if (unit := behind.get(name) or stated.get(spelt[name]))}
         unreadable = tuple(name for name, field in zip(named, fields, strict=True) if not _is_readable(field))
+        index = [n for n in (file.schema_arrow.pandas_metadata or {}).get("index_columns", ()) if n in whole]
+        if len(index) == 1 and TIME not in named and pa.types.is_temporal(fields[whole.index(index[0])].type):
+            named = (TIME, *(name for name in named if not name.startswith("__index_level_")))
+            spelt[TIME] = index[0]
 
     def blocks(chosen: list[str], every: int) -> Iterator[Columns]:
         with _opened(path) as file:
