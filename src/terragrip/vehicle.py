@@ -6,7 +6,7 @@ The frame is the body's: x forward, z up. Axles are listed front to rear, wheels
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -385,8 +385,8 @@ class Vehicle(Part):
 def require_vehicle(vehicle: object) -> None:
     """Raise InputError unless ``vehicle`` is one."""
     if not isinstance(vehicle, Vehicle):
-        way = "what Vehicle.from_dict(data)" if isinstance(vehicle, Mapping) else "what Vehicle.load(path)"
-        raise InputError(f"{type(vehicle).__name__} is no vehicle", hint=f"give {way} returns")
+        hint = "give what Vehicle.load(path) returns, or Vehicle.from_dict(data)"
+        raise InputError(f"{type(vehicle).__name__} is no vehicle", hint=hint)
 
 
 def _frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -53,9 +53,6 @@ class ByName:
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
 
-    def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and name in self.names
-
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """One column (n,); raises KeyError if there is none, and TypeError on rows or lists of names."""
         if not isinstance(name, str):

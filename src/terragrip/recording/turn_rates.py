@@ -106,47 +106,31 @@ def _mirrored(recording: Recording, vehicle: Vehicle, track: Track) -> list[str]
 
 def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, track: Track | None) -> str:
     """Where the rate of turn exceeds the others' by the factor of degrees to radians. A skid-steered vehicle turns by as little
-    as a third of the turn by its wheels' speeds."""
+    as a third of the turn by its wheels' speeds. Straight ahead none is in proportion: there hubs would differ from side to side."""
     others: dict[str, Floats] = {}
     if vehicle is not None and vehicle.track and vehicle.knows_wheels:
         rims = _wheel_turn(recording, vehicle, rims=True) / vehicle.track
         others["the wheels' speeds"] = rims
     if track is not None:
         others["the positions"] = track.at("turn", recording.time)
+    pace = filled(recording.time, recording.channels.get("ground_speed", np.full(len(yaw), np.nan)))
+    turned, still = False, []
     for who, turn in others.items():
-        if abs(agreement(recording.time, yaw, turn)) < SURE:
-            continue
         known = np.isfinite(yaw) & np.isfinite(turn)
-        ratio = float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
-        if 12 < ratio < 100:
-            return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
-    return _straight_scale(recording, yaw, vehicle, others)
-
-
-def _straight_scale(
-    recording: Recording, yaw: Floats, vehicle: Vehicle | None, others: dict[str, Floats]
-) -> str:
-    """Where the gyroscope turns much and one of ``others`` hardly at all: straight ahead no rates of turn are in proportion."""
-    ground = recording.channels.get("ground_speed")
-    if ground is None or vehicle is None or not vehicle.track:
-        return ""
-    still: list[str] = []
-    size = 0.0
-    for who, turn in others.items():
-        values = np.array([yaw, turn, filled(recording.time, ground)])
-        means = windows(recording.time, np.where(np.isfinite(values).all(axis=0), values, np.nan))
-        if not means.size or np.sum(np.abs(means[0])) * WINDOW < LEAST_TURN:
-            continue
-        own, other, pace = np.sqrt(np.mean(means**2, axis=1))
         if abs(agreement(recording.time, yaw, turn)) >= SURE:
-            return ""
-        if own > max(12 * other, _UNLIKE * pace / vehicle.track):
-            still, size = [*still, who], float(own)
-    if not still:
+            turned, ratio = True, float(np.sqrt(np.mean(yaw[known] ** 2) / np.mean(turn[known] ** 2)))
+            if 12 < ratio < 100:
+                return f"angular_velocity_z is {ratio:.2g} times the rate of turn of {who}: it may be in deg/s: 1 deg/s is 0.01745 rad/s."
+            continue
+        means = windows(recording.time, np.where(known & np.isfinite(pace), [yaw, turn, pace], np.nan))
+        if vehicle is not None and vehicle.track and np.sum(np.abs(means[0])) * WINDOW >= LEAST_TURN:
+            own, other, speed = np.sqrt(np.mean(means**2, axis=1))
+            still += [who] * bool(own > max(12 * other, _UNLIKE * speed / vehicle.track))
+    if turned or not still:
         return ""
     return (
-        f"angular_velocity_z turns by {size:.2g} rad/s, {' and '.join(still)} hardly at all: it may be in deg/s "
-        "(1 deg/s is 0.01745 rad/s), or its zero is off. Slips are wrong by it."
+        f"angular_velocity_z turns all the way, {' and '.join(still)} hardly at all: it may be in deg/s (1 deg/s is 0.01745 rad/s), "
+        "or its zero is off. Slips are wrong by it."
     )
 
 

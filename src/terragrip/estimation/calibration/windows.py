@@ -132,8 +132,7 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         start=starts,
         count=samples("ground_speed"),
         torque_count=np.min(
-            [samples(f"drive_torque_{w}") for w, on in zip(wheels, vehicle.driven, strict=True) if on]
-            or [np.zeros(n)],
+            [samples(f"drive_torque_{w}") for w in vehicle.driven_wheels] or [np.zeros(n)],
             axis=0,
         ),
         drawbar_count=samples("drawbar_force"),
