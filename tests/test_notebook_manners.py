@@ -209,6 +209,7 @@ def test_tables_are_read_by_name_and_say_so(run: Any, estimates: Estimates) -> N
     for table in (run.recording, estimates):
         assert list(table) == list(table.names) == list(table.to_pandas())
         assert "time" in table
+        assert list(pd.DataFrame(dict(table))) == list(table.names)
         assert 0 not in table
         uses: list[Callable[[], Any]] = [
             lambda one=table: one[:5],
@@ -225,7 +226,7 @@ def test_tables_are_read_by_name_and_say_so(run: Any, estimates: Estimates) -> N
                 use()
         with pytest.raises(AttributeError, match=r"no 'head': a column is \w+\['time'\]"):
             table.head()
-        assert not hasattr(table, "keys")
+        assert not hasattr(table, "items")
 
 
 def test_what_is_no_vehicle_is_refused_by_the_way_to_one(run: Any) -> None:

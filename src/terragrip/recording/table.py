@@ -53,6 +53,10 @@ class ByName:
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
 
+    def keys(self) -> tuple[str, ...]:
+        """The names, by which ``dict(table)`` has all columns: for pandas, or SciPy's ``savemat``."""
+        return self.names
+
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """One column (n,); raises KeyError if there is none, and TypeError on rows or lists of names."""
         if not isinstance(name, str):
