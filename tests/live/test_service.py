@@ -41,6 +41,18 @@ async def test_a_replay_gives_what_the_estimator_gives(tmp_path, vehicle, short)
         assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
 
 
+async def test_a_replay_does_not_wait_for_a_winter(tmp_path, vehicle, short, monkeypatch):
+    """Five months at ten times the pace are two weeks, without a word."""
+    monkeypatch.setattr("terragrip.live.links.replay._PAUSE", 0.01)
+    table = short.recording.to_pandas()
+    table["time"] += 150 * 86400.0 * (table["time"] > 3)
+    table.to_parquet(tmp_path / "drive.parquet")
+    service = Service(vehicle, [f"replay:{tmp_path / 'drive.parquet'}?speed=10"])
+    async with asyncio.timeout(60):
+        await service.run()
+    assert service.core.rows == len(table)
+
+
 async def test_no_object_holds_its_caller(tmp_path, vehicle, short, port, sender):
     """References lead one way, from source to sink: no walk along the live service's objects comes back to where it was."""
     sinks = ["udp://127.0.0.1:9", f"studio://127.0.0.1:{port}"]

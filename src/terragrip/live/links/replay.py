@@ -13,10 +13,12 @@ from terragrip.live.feed import Feed
 from terragrip.live.uri import Uri
 
 _AT_ONCE = 256  # rows
+_PAUSE = 10.0  # s that are waited at most: a log of two days has a night in it
 
 
 class ReplaySource:
-    """``replay:LOG?speed=10``: any log that ``terragrip estimate`` reads, through the same profile; ``speed=max`` does not wait.
+    """``replay:LOG?speed=10``: any log that ``terragrip estimate`` reads, through the same profile; ``speed=max`` does not wait,
+    and of a pause of the log ten seconds are waited.
 
     Rows arrive at their own stamps, so that a replay gives the same at any speed, and goes on after a kill where it was. Raises
     InputError where the log cannot be read.
@@ -46,7 +48,9 @@ class ReplaySource:
             if math.isfinite(self.speed):
                 wait = (float(time[first]) - at) / self.speed - (loop.time() - began)
                 if wait > 0.0:
-                    await asyncio.sleep(wait)
+                    await asyncio.sleep(min(wait, _PAUSE))
+                if wait > _PAUSE:
+                    began, at = loop.time(), float(time[first])
                 now = at + (loop.time() - began) * self.speed
                 last = min(last, max(first + 1, int(np.searchsorted(time, now, side="right"))))
             await feed.inbox.room()
