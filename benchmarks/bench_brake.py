@@ -5,7 +5,8 @@
 Each machine drives in spurts, and slows down at 1 to 3 m/s² to rest or to a part of its speed. Where its wheels' true torques are
 below 0 by 3 % of the weight, a brake gives that part, on every wheel, and the log says 0 with the sensor's noise. Three logs of one
 drive: torques that contain the brake, the motors' alone, and these with a switch at ``--switch`` Hz. Intervals of 95 % are counted
-while the brake acts, in the 2 s after, and in all other moving rows; means over the machines.
+while the brake acts, in the 2 s after, and in all other moving rows; means over the machines. Then: how many drives the note on a brake
+that no channel tells of names, and how many right ones (brake in the torques; field work; rough ground; digging in).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from terragrip.estimation import Estimates, estimate
 from terragrip.recording import Recording
+from terragrip.recording.slowing import slowing_warnings
 from terragrip.simulation import SimulationResult, families, simulate
 from terragrip.simulation.families import Kind
 from terragrip.units import STANDARD_GRAVITY
@@ -70,6 +72,32 @@ def main() -> None:
             cells = [f"{100 * mu[0]:.0f}", f"{mu[1]:+.3f}", f"{mu[3]:.3f}"]
             cells += [f"{100 * rho[0]:.0f}", f"{rho[1]:+.3f}", f"{rho[3]:.3f}", f"{100 * slip[0]:.0f}"]
             print(f"| {rate:g} | {log} | {part} | {' | '.join(cells)} |")
+    for rate in arguments.rates:
+        found = np.sum(
+            [
+                named(*one, rate)
+                for one in families.machines("development", arguments.machines, arguments.seed)
+            ],
+            axis=0,
+        )
+        print(
+            f"At {rate:g} Hz named: {found[0]} of {found[1]} drives with two brakings, {found[2]} of {found[3]} right ones."
+        )
+
+
+def named(kind: Kind, seed: int, rate: float) -> tuple[int, int, int, int]:
+    """Drives of a machine that brakes unsaid, twice at least, that are named, and all of them; right ones named, and all."""
+    result = spurts(kind, seed, rate)
+    log, acts = braked(result, 10.0)
+    unsaid = replace(log, channels={n: v for n, v in log.channels.items() if n != "brake"})
+    often = int(np.sum(np.diff(acts.astype(int), prepend=0) > 0) >= 2)
+    right = [result, spurts(kind, seed, rate, brakes=False)]
+    right += [
+        families.draw(kind, seed, rate=rate, task="healthy"),
+        families.draw(kind, seed, rate=rate, task="digging"),
+    ]
+    wrong = sum(bool(slowing_warnings(one.recording, one.vehicle)) for one in right)
+    return often * bool(slowing_warnings(unsaid, result.vehicle)), often, wrong, len(right)
 
 
 def _four(score: Score) -> tuple[float, ...]:

@@ -70,6 +70,7 @@ PAGES = (
     ("is wrong: check ", "formats#in-a-profile"),
     ("Columns that are not used", "formats#in-a-profile"),
     ("A brake acts in", "vehicle#brakes"),
+    ("as by a friction brake", "vehicle#brakes"),
     ("the vehicle is assumed to tow nothing", "vehicle#signals-that-are-missing"),
     ("No drive torque was found", "vehicle#signals-that-are-missing"),
     ("No acceleration_x was found", "vehicle#signals-that-are-missing"),

@@ -13,16 +13,17 @@ from drives import WHEELS, Drive, drive, robot
 from terragrip.errors import InputError
 from terragrip.estimation.methods import METHODS
 from terragrip.physics.loads import GRAVITY
+from terragrip.recording.slowing import slowing_warnings
 from test_engine_samples import tractor, work
 
 PERIOD, BRAKING = 7.0, 6.0  # s: a stretch, and when in it the brake acts
-GAIN, LOSS = 0.4, 2.4  # m/s²
+GAIN, LOSS = 0.6, 3.6  # m/s²
 
 
 def speed(t: Any) -> Any:
-    """From .6 m/s up to 3 in 6 s, and down again in one."""
+    """From .6 m/s up to 4.2 in 6 s, and down again in one."""
     phase = t % PERIOD
-    return np.where(phase < BRAKING, 0.6 + GAIN * phase, 3.0 - LOSS * (phase - BRAKING))
+    return np.where(phase < BRAKING, 0.6 + GAIN * phase, 4.2 - LOSS * (phase - BRAKING))
 
 
 def brakes(t: Any) -> Any:
@@ -30,7 +31,7 @@ def brakes(t: Any) -> Any:
 
 
 def slip(t: Any) -> Any:
-    """That of a steady pull of .05 of the weight: adhesion is -.11 while it brakes."""
+    """That of a steady pull of .05 of the weight: adhesion is -.24 while it brakes."""
     mu = 0.08 + 0.05 + np.where(brakes(t), -LOSS, GAIN) / GRAVITY
     return -np.log(1 - 2 * mu) / 10
 
@@ -145,3 +146,23 @@ def test_checks_and_calibration_leave_braked_rows_out() -> None:
     pressed = with_brake.with_channels(brake=np.ones(len(with_brake)))
     with pytest.raises(InputError, match="column brake: is pressed throughout; 0 is released"):
         tg.calibrate(pressed, robot())
+
+
+@pytest.mark.parametrize("rate", [100.0, 10.0])
+def test_a_brake_that_no_channel_tells_of_is_named(rate: float) -> None:
+    log = braked_log(60.0, switch_rate=rate, rate=rate).recording
+    unsaid = tg.Recording(log.time, {n: v for n, v in log.channels.items() if n != "brake"})
+    (note,) = slowing_warnings(unsaid, robot())
+    assert "In 8 stretches the vehicle slows down by 0.1" in note
+    assert "Give its switch, pedal or pressure as the channel 'brake'." in note
+    assert not slowing_warnings(log, robot())
+
+
+def test_motors_that_brake_and_hills_are_no_friction_brake() -> None:
+    """A climb slows the vehicle down without thrust, too: an accelerometer reads nothing of it."""
+    by_motor = drive(60.0, speed=speed, slip=slip, imu=True).recording
+    uphill = drive(
+        60.0, speed=speed, slip=lambda t: np.where(brakes(t), 0.0, slip(t)), slope=lambda t: 0.37 * brakes(t), imu=True
+    ).recording  # fmt: skip
+    assert not slowing_warnings(by_motor, robot())
+    assert not slowing_warnings(uphill, robot())

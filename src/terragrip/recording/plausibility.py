@@ -41,6 +41,7 @@ from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_r
 from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
+from terragrip.recording.slowing import slowing_warnings
 from terragrip.recording.speed_ratios import drive_train_warnings, position_warnings, rim_warnings
 from terragrip.recording.steering import joint_warnings, steering_warnings
 from terragrip.recording.torques import sign_warnings, torque_warnings
@@ -249,6 +250,11 @@ _EACH = (
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
         (*_COURSES, *_FORCES, "torques"),
+    ),
+    Check(
+        "slowing",
+        lambda log: slowing_warnings(log.rows, log.vehicle),
+        (*_COURSES, *_FORCES, "torques", "balance"),
     ),
     Check(
         "shortfall",
