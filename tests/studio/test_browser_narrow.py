@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -45,3 +46,25 @@ def test_the_cabs_numbers_use_the_screen(page: Any, served: Served) -> None:
         assert size > 0.08 * max(width, height), width
         beyond = "() => { const e = document.querySelector('main'); return e.scrollHeight - e.clientHeight; }"
         assert page.evaluate(beyond) <= 1, width
+
+
+def test_of_many_logs_the_other_kinds_stay_in_reach(page: Any, served: Served, folder: Path) -> None:
+    for i in range(60):
+        (folder / f"log-{i:02}.csv").write_text("time,wheel_speed_l\n0,1\n")
+    for width, height in ((360, 740), (1280, 720)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(f"{served.url}/#/start")
+        page.wait_for_selector("text=log-59.csv")
+        top = page.evaluate("() => document.querySelector('[aria-label=Vehicles]').offsetTop")
+        assert top < 3 * height, width
+        assert page.locator("#bar").bounding_box()["height"] < 60, width  # one line
+
+
+def test_a_log_that_takes_long_to_read_shows_that_it_is_read(page: Any, served: Served) -> None:
+    held: list[Any] = []
+    page.route("**/api/columns?*", lambda route: held.append(route))
+    page.goto(f"{served.url}/#/start?log=recording.parquet")
+    page.get_by_role("progressbar", name="Reading the log …").wait_for()
+    held[0].continue_()
+    page.wait_for_selector("#wizard-profile")
+    assert page.get_by_role("progressbar", name="Reading the log …").count() == 0

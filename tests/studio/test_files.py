@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
+import os
 from pathlib import Path
 
 import pytest
@@ -85,3 +87,18 @@ def test_pages_hear_of_a_new_file(client: TestClient, folder: Path) -> None:
         (folder / "another.yaml").write_text("axles: {}")
         assert one.receive_json() == {"kind": "folder"}
         assert two.receive_json() == {"kind": "folder"}
+
+
+def test_a_file_that_cannot_be_removed_is_named_with_the_reason(
+    client: TestClient, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A read-only disk gave an 'Internal Server Error'."""
+
+    def refuse(path: Path) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    answer = client.delete("/api/file", params={"path": "soils.json"})
+    monkeypatch.undo()
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("soils.json: cannot be removed (Read-only file system)")

@@ -1,7 +1,7 @@
 /** Results of `terragrip advise` for a run, soil by soil, requested when the panel is opened. */
 
 import { get } from "../ui/api";
-import { digits, fill, h } from "../ui/dom";
+import { digits, fill, h, working } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { onUnits, unitFor, withUnit } from "../ui/units";
 
@@ -76,7 +76,7 @@ export class AdvicePanel {
     if (!this.element.open || this.asked === `${path} ${version}`) return;
     this.asked = `${path} ${version}`;
     if (!path) return fill(this.body, h("p", { class: "hint" }, "No run is open."));
-    fill(this.body, h("p", { class: "hint" }, "Computing …"));
+    fill(this.body, working("Computing …"));
     const found = await tried(() => get<Advice>("advice", { path, version }));
     if (this.path !== path || this.version !== version) return; // another run was opened meanwhile
     if (found) this.draw((this.known = found));

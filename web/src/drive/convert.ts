@@ -10,7 +10,7 @@ export function wholeRun(path: () => string): HTMLElement {
   const take = async (suffix: string): Promise<void> => {
     const from = path();
     const name = `${from.split("/").at(-1)?.replace(/\.parquet$/, "")}${suffix}`;
-    note(`Writing ${name} …`);
+    note(`Writing ${name} …`, "work"); // a large one as Excel or MCAP for a minute
     const file = await tried(async () => (await request("drive/converted", { path: from, suffix })).blob());
     withdraw(`Writing ${name} …`);
     if (file) save(name, file);

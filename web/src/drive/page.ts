@@ -4,7 +4,7 @@ import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { brushed } from "../ui/brush";
 import { moment } from "../ui/clock";
-import { digits, fill, h } from "../ui/dom";
+import { digits, fill, h, working } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { oneAtATime, type Page } from "../ui/page";
 import { notHere, options, runsOf } from "../ui/runs";
@@ -32,8 +32,8 @@ import { during, type Run } from "./run";
 const FIRST = ["adhesion", "slip", "resistance", "speed"];
 const KEY = "terragrip-drive-panels";
 const HINT = "Drag or shift+wheel zooms, arrow keys pan, double click shows all.";
-const HINT_NARROW = "Two fingers zoom, one pans.";
-const NARROW = matchMedia("(max-width: 600px)"); // as in the style sheet
+const HINT_FINGERS = "Two fingers zoom, one pans.";
+const FINGERS = matchMedia("(max-width: 600px), (hover: none)");
 
 export const page: Page = (main, { notices, query }) => {
   const charts = new Charts();
@@ -220,7 +220,7 @@ export const page: Page = (main, { notices, query }) => {
   }
 
   async function open(wanted: string): Promise<void> {
-    const reading = window.setTimeout(() => fill(legend, h("span", { class: "hint" }, `Reading ${wanted} …`)), 200);
+    const reading = window.setTimeout(() => fill(legend, working(`Reading ${wanted} …`)), 200);
     const layer = await tried(() => layerOf(wanted, "time"));
     const placed = layer && axis !== "time" ? ((await tried(() => moved(layer, axis))) ?? layer) : layer;
     clearTimeout(reading);
@@ -270,7 +270,7 @@ export const page: Page = (main, { notices, query }) => {
   function hover(time: number | null): void {
     plane.point(time);
     if (time === null || !run) {
-      readout.value = run ? (NARROW.matches ? HINT_NARROW : HINT) : "";
+      readout.value = run ? (FINGERS.matches ? HINT_FINGERS : HINT) : "";
       return;
     }
     const soil = during(run.soils, time)?.name;

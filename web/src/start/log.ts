@@ -2,7 +2,7 @@
 
 import type { Run } from "../drive/run";
 import { get, send, SILENT, type Item, type Job } from "../ui/api";
-import { fill, h } from "../ui/dom";
+import { fill, h, working } from "../ui/dom";
 import { tried } from "../ui/notes";
 import { oneAtATime, type Context } from "../ui/page";
 import { onceReleased } from "../ui/press";
@@ -267,7 +267,7 @@ export class LogPage {
       fill(found, h("p", { class: "hint" }, this.preview ? "Not ready: choose the columns first." : "Not ready: the log cannot be read."));
       return;
     }
-    fill(found, h("p", { class: "hint" }, this.vehicle ? "Trying an estimate …" : "Reading the log …"));
+    fill(found, working(this.vehicle ? "Trying an estimate …" : "Reading the log …"));
     try {
       const result = await get<Inspection>("inspect", { path: this.log, profile: this.profile || undefined, vehicle: this.vehicle || undefined, method });
       if (turn !== this.checks) return;

@@ -1,7 +1,7 @@
 /** The columns of a foreign log, and which channel each becomes: proposals with their reason, unit, sign and a small plot. */
 
 import { get, send } from "../ui/api";
-import { fill, h } from "../ui/dom";
+import { fill, h, working } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { numberField } from "../ui/number";
 import { chosenByHand, plot, rangeOf, type Column } from "./column";
@@ -111,7 +111,7 @@ export class Mapping {
   /** Preview the log, with the choice that a `profile` has, else what is proposed; `output` is the profile to write in place of it. */
   async open(output: string, profile = ""): Promise<Preview | undefined> {
     const turn = ++this.turn;
-    fill(this.element, h("p", { class: "hint" }, "Reading the log …"));
+    fill(this.element, working("Reading the log …"));
     try {
       const preview = await get<Preview>("columns", { path: this.log, profile: profile || undefined });
       if (turn !== this.turn) return this.preview; // another profile was chosen meanwhile

@@ -119,7 +119,7 @@ function openFolder(main: HTMLElement, { notices }: Context): () => void {
       h("h2", {}, name),
       actions.length ? h("div", { class: "row actions" }, actions.map(([command, text]) => h("button", { type: "button", "data-key": `do ${command}`, click: () => begin(command, of) }, text)), h("span", { class: "hint", "data-count": kind }, counted(of))) : null,
       kind === "vehicle" ? h("div", { class: "row actions" }, h("a", { href: "#/start?machine", class: "button", "data-key": "make" }, "Make a vehicle file")) : null,
-      of.length ? h("table", { class: "files" }, h("tbody", {}, rows)) : h("p", { class: "hint" }, none),
+      of.length ? h("div", { class: "listed" }, h("table", { class: "files" }, h("tbody", {}, rows))) : h("p", { class: "hint" }, none),
     );
   }
 

@@ -32,6 +32,11 @@ export function fill(parent: Element, ...children: (Child | Child[])[]): void {
   add(parent, children);
 }
 
+/** What takes a while: in words, with a bar that moves. */
+export function working(text: string): HTMLElement {
+  return h("p", { class: "hint" }, text, " ", h("progress", { "aria-label": text }));
+}
+
 /** A number as a reader wants it: three digits, no exponent where it can be helped. */
 export function digits(value: number | null | undefined, count = 3): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";

@@ -2,13 +2,13 @@ import { h } from "./dom";
 
 export const SHOWN = 6000; // ms
 
-/** One line at the foot of the page; an error stays until it is dismissed, or its page is left. The same line is not shown twice.
+/** One line at the foot of the page; an error stays until it is dismissed, or its page is left, work until it is withdrawn. The same line is not shown twice.
  * `about`: of what it is, for `tried`. */
-export function note(text: string, kind: "info" | "error" = "info", about = ""): void {
+export function note(text: string, kind: "info" | "error" | "work" = "info", about = ""): void {
   const box = document.getElementById("notes");
   if (!box) return;
   withdraw(text);
-  const line = h("div", { class: `note ${kind}`, role: kind === "error" ? "alert" : null, "data-about": about }, h("span", {}, text));
+  const line = h("div", { class: `note ${kind}`, role: kind === "error" ? "alert" : null, "data-about": about }, h("span", {}, text), kind === "work" && h("progress", { "aria-label": text }));
   line.append(h("button", { type: "button", "aria-label": "Dismiss", click: () => line.remove() }, "×"));
   box.append(line);
   while (box.children.length > 4) box.firstElementChild?.remove();

@@ -97,7 +97,12 @@ async def upload(request: Request, studio: Here, path: Named, replace: bool = Fa
 @router.delete("/file", status_code=204)
 def remove_file(studio: Here, path: Named) -> None:
     """Remove a file of the folder."""
-    studio.folder.file(path).unlink()
+    try:
+        studio.folder.file(path).unlink()
+    except OSError as error:
+        raise InputError(
+            f"cannot be removed ({error.strerror})", file=path, hint="make its folder writable"
+        ) from error
 
 
 @router.get("/inspect")
