@@ -123,10 +123,10 @@ export class JobList {
 }
 
 function progress(bar: HTMLProgressElement, job: Job): void {
-  if (job.total) {
+  if (job.done) {
     bar.max = job.total;
     bar.value = job.done;
-  } else bar.removeAttribute("value");
+  } else bar.removeAttribute("value"); // it moves, also during the first pass over a long log
 }
 
 /** A command line, and a button that copies it. */
