@@ -294,6 +294,21 @@ def test_a_log_is_tried_again_when_the_studio_is_back(
     assert page.is_enabled("#wizard-go")
 
 
+def test_a_log_whose_reading_was_cut_off_is_read_when_the_studio_is_back(
+    page: Any, served: Served, folder: Path, made: Path
+) -> None:
+    for name in ("recording.parquet", "vehicle.yaml"):
+        (folder / name).write_bytes((made / name).read_bytes())
+    page.route("**/api/columns?*", lambda route: route.abort("connectionrefused"))
+    page.goto(f"{served.url}/#/start?log=recording.parquet")
+    page.wait_for_selector("#wizard-found:has-text('cannot be read')")
+    page.unroute("**/api/columns?*")
+    served.stop()
+    page.wait_for_selector("text=does not respond; trying again")
+    served.start()
+    page.wait_for_selector("#wizard-found:has-text('ready to estimate')")
+
+
 def test_what_was_chosen_and_typed_outlasts_a_reload_and_another_class(
     page: Any, served: Served, folder: Path, foreign: Path, made: Path
 ) -> None:

@@ -78,7 +78,8 @@ export class LogPage {
   /** The folder has changed: what is said here must not be of files that are others now. */
   private async renew(): Promise<void> {
     await this.reload();
-    if (!this.preview && this.read[0] !== "" && this.version(this.log) !== this.read[0]) return this.open(); // it could not be read before
+    const silent = this.mapping?.element.textContent === SILENT;
+    if (!this.preview && this.read[0] !== "" && (silent || this.version(this.log) !== this.read[0])) return this.open(); // it could not be read before
     const select = document.getElementById("wizard-vehicle") as HTMLSelectElement | null;
     const found = document.getElementById("wizard-found");
     if (!select || !found) return; // still opening
