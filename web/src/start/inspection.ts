@@ -6,8 +6,6 @@ export interface Inspection {
   /** Why an estimate cannot run, though the log is whole; null where nothing is known against it. */
   problem: string | null;
   missing: string[];
-  /** The vehicle's free wheels whose speed the log lacks. */
-  rolling: string[];
   warnings: string[];
   recognised: Record<string, string[]>;
   text: string;

@@ -278,7 +278,6 @@ export class LogPage {
         found,
         h("p", { class: ready ? "good" : "bad" }, verdict(result, this.vehicle !== "", this.of("vehicle").length > 0)),
         ready ? null : this.namesMissing(),
-        this.offerRolling(result.rolling),
         result.warnings.filter((text) => !result.problem?.endsWith(text)).map((text) => h("p", { class: "hint" }, text)),
         h("details", {}, h("summary", {}, "Contents"), h("pre", { tabindex: "0" }, result.text)),
       );
@@ -301,17 +300,6 @@ export class LogPage {
       this.mapping?.names.focus(first);
     };
     return h("p", {}, h("button", { type: "button", id: "name-wheels", click: go }, "Assign the wheels"));
-  }
-
-  /** What lets a machine be estimated whose free wheels have no sensor. */
-  private offerRolling(wheels: string[]): HTMLElement | null {
-    if (!wheels.length || this.mapping?.strangers.length) return null;
-    const roll = async (): Promise<void> => {
-      await this.mapping?.roll(this.vehicle);
-      await this.readBy(this.profile);
-    };
-    const button = h("button", { type: "button", id: "roll-free", click: () => void roll() }, "Let them roll with the ground");
-    return h("p", {}, button, ` ${wheels.join(", ")} ${wheels.length === 1 ? "is a free wheel" : "are free wheels"} without a speed in the log: the profile gives them the ground speed over their radius, so their slip is 0.`);
   }
 
   private async queue(kind: string, wanted: Record<string, unknown>, output: string): Promise<void> {

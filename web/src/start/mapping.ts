@@ -323,12 +323,7 @@ export class Mapping {
     }
   }
 
-  /** Keep the choice, with the ground speed over their radius for a vehicle's free wheels that have no speed. */
-  async roll(vehicle: string): Promise<void> {
-    await this.save((document.getElementById("profile-output") as HTMLInputElement).value.trim(), vehicle);
-  }
-
-  private async save(output: string, vehicle = ""): Promise<void> {
+  private async save(output: string): Promise<void> {
     const twice = this.names.twice();
     if (twice) {
       note(`${twice.join(" and ")} have the same name: ${this.names.nameOf(twice[0])}. Each must be a different wheel or axle.`, "error");
@@ -345,7 +340,7 @@ export class Mapping {
     if (isOld && !confirm(`Replace ${output}?`)) return;
     const named = new Map(this.preview?.channels.map((channel) => [channel.name, this.names.channel(channel)]));
     const channels = Object.fromEntries([...this.chosen].map(([name, choice]) => [named.get(name) ?? name, choice.entry]));
-    const wanted = { log: this.log, output, time: this.preview?.time ?? { from: "time" }, channels, vehicle, replace: isOld || output === this.own };
+    const wanted = { log: this.log, output, time: this.preview?.time ?? { from: "time" }, channels, replace: isOld || output === this.own };
     const kept = await tried(() => send<{ path: string }>("POST", "profile", wanted), "columns");
     if (!kept) return;
     this.own = this.profile = kept.path;

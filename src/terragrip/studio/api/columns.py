@@ -24,10 +24,6 @@ class ProfileRequest(BaseModel):
     output: str = Field(description="YAML file to write.")
     time: dict[str, Any]
     channels: dict[str, dict[str, Any]] = Field(min_length=1)
-    vehicle: str = Field(
-        "",
-        description="Vehicle file: its free wheels without a speed get the ground speed over their radius.",
-    )
     replace: bool = False
 
 
@@ -74,15 +70,11 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     target = studio.folder.new_file(wanted.output, (".yaml", ".yml"))
     if target.exists() and not wanted.replace:
         raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
-    channels = wanted.channels
-    if wanted.vehicle:
-        units = {one.name: one.unit for one in studio.logs.get(log).inspection.columns}
-        channels = channels | _rolling(channels, units, studio.folder.file(wanted.vehicle))
-    chosen = Profile.from_dict({"time": wanted.time, "channels": channels}, wanted.output)
+    chosen = Profile.from_dict({"time": wanted.time, "channels": wanted.channels}, wanted.output)
     text = profile_text(
         Path(wanted.log).name,
         TimeColumn(chosen.time.column, chosen.time.unit),
-        {name: Proposal(entry) for name, entry in channels.items()},
+        {name: Proposal(entry) for name, entry in wanted.channels.items()},
         since_1970=chosen.time.zero is not None,
         head=HEAD,
     )
@@ -96,35 +88,6 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
             )
         _read_some(log, temporary)
     return {"path": wanted.output, "text": text}
-
-
-def _rolling(
-    channels: dict[str, dict[str, Any]], units: dict[str, str | None], vehicle: Path
-) -> dict[str, dict[str, Any]]:
-    """The ground speed over the radius [rad/s], for each free wheel of a vehicle whose speed no channel is."""
-    from terragrip.units import factor_to
-    from terragrip.vehicle import Vehicle
-
-    ground = channels.get("ground_speed", {})
-    if not {"from"} <= set(ground) <= {"from", "unit", "scale", "sign", "delay", "invalid"}:
-        raise InputError(
-            "the ground speed is no column of the log",
-            place="ground_speed",
-            hint="write the free wheels' speeds into the profile (docs: vehicle#signals-that-are-missing)",
-        )
-    known = Vehicle.load(vehicle)
-    speed = ground.get("scale", 1.0) * factor_to(
-        ground.get("unit") or units.get(ground["from"]) or "m/s", "m/s"
-    )
-    return {
-        f"wheel_speed_{wheel}": {
-            **ground,
-            "unit": "rad/s",
-            "scale": float(f"{speed / known.radii[wheel]:.6g}"),
-        }
-        for wheel in known.free_wheels
-        if f"wheel_speed_{wheel}" not in channels
-    }
 
 
 def _choice(profile: str) -> dict[str, Any] | None:

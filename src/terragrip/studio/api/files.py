@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -111,8 +111,7 @@ def inspect_log(
 ) -> dict[str, Any]:
     """What a log holds, which channels were found, what is missing, and a profile to begin with.
 
-    With a vehicle, `ready` means that an estimate will run: it is begun, and `problem` is the reason where it cannot; `rolling` are its
-    free wheels whose speed the log lacks.
+    With a vehicle, `ready` means that an estimate will run: it is begun, and `problem` is the reason where it cannot.
     """
     from terragrip.formats import inspect
 
@@ -127,21 +126,9 @@ def inspect_log(
         "file": path,
         "text": inspection.to_text().replace(root, ""),
         "ready": inspection.ready and problem is None,
-        "rolling": _rolling(inspection.recognised, machine),
         "problem": None if problem is None else problem.replace(root, ""),
     }
     return plain
-
-
-def _rolling(found: Collection[str], machine: Path | None) -> list[str]:
-    """A vehicle's free wheels without a speed among the channels, where the driven ones and the ground have theirs."""
-    from terragrip.vehicle import Vehicle
-
-    if machine is None or "ground_speed" not in found:
-        return []
-    vehicle = Vehicle.load(machine)
-    missing = [wheel for wheel in vehicle.wheels if f"wheel_speed_{wheel}" not in found]
-    return missing if set(missing) <= set(vehicle.free_wheels) else []
 
 
 def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | None:
