@@ -146,3 +146,6 @@ def test_a_replay_is_sought(page: Any, served: Served) -> None:
     )
     page.wait_for_function("() => window.terragripLive.feed.ring.now > 25")
     assert page.evaluate("() => window.terragripLive.feed.ring.oldest") >= 25
+    # As after a drag, or by Tab: it stood still, and an arrow key then went on from there.
+    page.focus("#seek")
+    page.wait_for_function("() => Number(document.getElementById('seek').value) > 26")

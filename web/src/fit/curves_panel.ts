@@ -313,7 +313,7 @@ export class CurvesPanel {
       { class: `result${sameCurve(curve) ? "" : " stale"}`, "aria-live": "polite" },
       h("p", { class: "apart" }, sameCurve(curve) ? "" : this.apart(curve, fit)),
       sameCurve(curve) ? null : h("button", { type: "button", id: "back-to-fit", click: () => this.back(curve, fit) }, "Back to the fit"),
-      h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
+      h("table", {}, h("thead", {}, h("tr", {}, h("td"), h("th", {}, "fit"), h("th", {}, "95 % interval"))), h("tbody", {}, rows, effective)),
       fit.automatic === undefined ? null : h("p", {}, `Begun at the curve as it was${fit.automatic === null ? "" : `; the automatic fit had R² ${digits(fit.automatic)}`}.`),
       h("p", {}, `R² ${digits(fit.r2)}, NRMSE ${digits(fit.nrmse)}, ${fit.bins.length} bins`),
       h("p", { class: `badge ${identified ? "good" : "poor"}` }, identified ? "identifiable" : "not identifiable", ` (condition ${digits(badge.condition, 2)})`),

@@ -62,14 +62,17 @@ export const page: Page = (main, { notices, query }) => {
     traces.lookBack(traces.back);
   });
   const seek = h("input", { type: "range", id: "seek", step: "any", "aria-label": "Position in the replay", hidden: true });
+  let seeking = false; // while it is dragged; what only has the focus goes on with the replay
+  seek.addEventListener("input", () => (seeking = true));
   seek.addEventListener("change", () => {
+    seeking = false;
     begin = Number(seek.value);
     feed.again();
   });
   const past = h("input", { type: "range", id: "live-back", step: "any", value: "100", disabled: true });
   past.addEventListener("input", () => traces.lookBack(Number(past.value)));
   const follow = h("button", { type: "button", id: "follow", hidden: true, click: () => traces.lookBack(null) }, "Now");
-  const place = h("output", { class: "hint" });
+  const place = h("output", { class: "hint", "aria-live": "off" });
   traces.onBack = drawPast;
   const cab = h("a", { class: "button", href: "#/cab" }, "Cab");
   main.append(
@@ -95,7 +98,9 @@ export const page: Page = (main, { notices, query }) => {
     past.disabled = ring.now - ring.oldest <= traces.span;
     follow.hidden = traces.back === null;
     place.value = traces.back === null ? "" : `looking back ${(ring.now - traces.back).toFixed(0)} s; the numbers above are current`;
-    if (feed.hello?.replay && document.activeElement !== seek) seek.value = String(ring.now);
+    past.setAttribute("aria-valuetext", place.value || "now");
+    if (feed.hello?.replay && !seeking) seek.value = String(ring.now);
+    seek.setAttribute("aria-valuetext", `${Number(seek.value).toFixed(0)} s`);
   }
 
 
