@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { during, panelsOf, soilsOf, type Run } from "../src/drive/run";
+import { during, panelsOf, soilColor, soilsOf, type Run } from "../src/drive/run";
 
 const WHEELS = ["rl", "rr"];
 const STATES = [...WHEELS.map((w) => `wheel_speed_${w}`), "ground_speed", ...WHEELS.map((w) => `adhesion_${w}`), "soil_resistance"];
@@ -38,4 +38,10 @@ it("tells soils from labels, else from what was recognised, and which stretch ho
 it("has no panel for what a method does not estimate", () => {
   const keys = panelsOf(run("bank", ["nis", "channels", "supervisor"]), WHEELS).map((panel) => panel.key);
   expect(keys).toEqual(["nis", "supervisor"]);
+});
+
+it("gives each ground of a field a colour of its own", () => {
+  const names = ["stubble", "ploughed", "grass", "clay", "headland", "wet"]; // some had one colour: their borders could not be seen
+  expect(new Set(names.map(soilColor)).size).toBe(names.length);
+  expect(names.map(soilColor)).toEqual(names.map(soilColor));
 });

@@ -197,12 +197,21 @@ export function during<T extends { start: number; end: number }>(stretches: read
 const SOIL_COLORS: Record<string, string> = { hard: "muted", fine: "orange", wet: "sky", coarse: "purple", grass: "green" };
 const SPARE = ["blue", "vermillion", "orange", "sky", "purple", "green"];
 
+const given = new Map<string, string>();
+
+/** The colour of a ground by its name: its own, or one that no other ground has had here, as long as there are any. */
 export function soilColor(name: string): string {
-  const known = SOIL_COLORS[name];
-  if (known) return known;
-  let sum = 0;
-  for (const c of name) sum = (sum * 31 + c.charCodeAt(0)) % 9973;
-  return SPARE[sum % SPARE.length] ?? "blue";
+  let found = given.get(name);
+  if (!found) {
+    let sum = 0;
+    for (const c of name) sum = (sum * 31 + c.charCodeAt(0)) % 9973;
+    const first = sum % SPARE.length;
+    const wanted = [SOIL_COLORS[name] ?? "", ...SPARE.slice(first), ...SPARE.slice(0, first)].filter(Boolean);
+    const taken = new Set(given.values());
+    found = wanted.find((one) => !taken.has(one)) ?? wanted[0] ?? "blue";
+    given.set(name, found);
+  }
+  return found;
 }
 
 export const EVENT_COLORS: Record<string, string> = {

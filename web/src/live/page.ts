@@ -1,6 +1,6 @@
 /** The live page: big numbers for the cab, six traces, warnings. Fed by the live service, or by a run played again. */
 
-import { soilColor, WHEEL_COLORS } from "../drive/run";
+import { WHEEL_COLORS } from "../drive/run";
 import { sampled } from "../fit/samples";
 import { get, type Item } from "../ui/api";
 import { digits, fill, h } from "../ui/dom";
@@ -165,7 +165,6 @@ export const page: Page = (main, { notices, query }) => {
     } else if (message.kind === "soil") {
       const sure = message.probability === null || message.probability === undefined ? (message.labelled ? "labelled" : "") : `${digits(100 * message.probability, 2)} % sure`;
       soil.set(message.soil || "–", sure);
-      soil.element.dataset["soil"] = soilColor(message.soil ?? "");
     } else if (message.kind === "status") {
       const lost = Object.values(message.counts ?? {}).reduce((sum, one) => sum + (one["dropped"] ?? 0), 0);
       delay = message.delay ?? 0;
