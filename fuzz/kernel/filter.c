@@ -18,19 +18,18 @@ static void one_step(bytes_left *b, int n)
     const tg_input held = input_of(b, &f.machine), now = byte_of(b) < 128 ? held : input_of(b, &f.machine);
     const unsigned kind = byte_of(b), missing = byte_of(b);
     const tg_real dt = kind & 64 ? number(b) : (tg_real)(0.001 * (1 + kind % 32));
-    tg_real q[NX] = {0}, shared[NX] = {0}, y[NY], r[NY];
+    tg_real q[NX] = {0}, y[NY], r[NY];
     tg_step out;
     for (int j = 0; j < n + 2; j++) {
         y[j] = missing >> (j % 8) & 1 ? (tg_real)NAN : number(b);
         r[j] = kind & 32 ? number(b) : (tg_real)0.01;
     }
     if (kind & 128) q[byte_of(b) % (unsigned)(2 * n + 2)] = number(b);
-    if (kind & 32) shared[byte_of(b) % (unsigned)(n + 1)] = number(b);
     memcpy(&before, &f, sizeof f);
     tg_status status;
     if (kind % 8 == 6) status = tg_filter_predict(&f, dt, &held, q);
     else if (kind % 8 == 7) status = tg_filter_restart(&f, dt, y, r);
-    else status = tg_filter_step_shared(&f, dt, &held, &now, q, shared, y, r, &out);
+    else status = tg_filter_step(&f, dt, &held, &now, q, y, r, &out);
     if (status != TG_OK) CHECK(memcmp(&f, &before, sizeof f) == 0, "a refused call changed the filter");
     else is_finite(2 * n + 2);
 }

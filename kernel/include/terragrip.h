@@ -100,7 +100,7 @@ typedef struct {
 
 typedef struct { /* what one update did; arrays in channel or state order, unused places 0 */
     int32_t channels;        /* how many channels were used */
-    tg_real nis;             /* normalised innovation squared, with the weighted R, less what neighbouring steps share */
+    tg_real nis;             /* normalised innovation squared, with the weighted R */
     tg_real log_likelihood;
     tg_real innovation[10];  /* NaN where the channel was missing */
     tg_real innovation_variance[10]; /* prior: (H P H')_jj + R_j, before weighting */
@@ -118,11 +118,6 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
  * step (input noise), never adapted or scaled. `r`: channel variances. `now`: the inputs at the instant of y (for a_x). */
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                          const tg_real *y, const tg_real *r, tg_step *out);
-/* The same where an input's error counts whole, as it adds up over many steps, though neighbouring steps share part of it: `shared`,
- * variances of (omega, v), n + 1 values, is what one step has less. NIS leaves it out, estimate and likelihood do not. It is part
- * of what this step, and the predictions since the last one, added to the variances; null: none. */
-tg_status tg_filter_step_shared(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
-                                const tg_real *shared, const tg_real *y, const tg_real *r, tg_step *out);
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input);
 /* Keep the marginal of (mu, rho_s), add `walk_time` seconds of their random walk, and restart (omega, v) at `outputs`
  * (n+1 values) with variances `variances`, uncorrelated: standstill (walk_time 0), a long gap, a change of direction. */

@@ -189,16 +189,15 @@ TG_INLINE tg_lanes coupling(const tgi_plan *plan, const tgi_update *out, int c, 
     return sum;
 }
 
-/* nu' S^-1 nu of the mixture: S is the modes' mean covariance of the innovations and the spread of their means, less what neighbouring
- * steps share. */
-TG_INLINE tg_real mixture_nis(const tgi_plan *plan, const tgi_update *out, const int n)
+/* nu' S^-1 nu of the mixture: S is the modes' mean covariance of the innovations and the spread of their means; S = L D L', solved as it is
+ * factored. */
+static tg_real mixture_nis(const tgi_plan *plan, const tgi_update *out, const int n)
 {
     const int count = out->used;
     tg_lanes T[TG_MAX_CHANNELS][TG_MAX_CHANNELS];
-    tg_real S[TG_MAX_CHANNELS][TG_MAX_CHANNELS], nu[TG_MAX_CHANNELS], least[TG_MAX_CHANNELS];
+    tg_real S[TG_MAX_CHANNELS][TG_MAX_CHANNELS], nu[TG_MAX_CHANNELS], nis = 0;
     for (int c = 0; c < count; c++) {
         nu[c] = out->innovation[out->channel[c]];
-        least[c] = plan->r[out->channel[c]];
         T[c][c] = lanes_all(1);
         for (int b = 0; b < c; b++) T[c][b] = coupling(plan, out, c, b, n);
         for (int b = 0; b <= c; b++) {
@@ -206,9 +205,17 @@ TG_INLINE tg_real mixture_nis(const tgi_plan *plan, const tgi_update *out, const
             for (int k = 0; k <= b; k++) sum += T[c][k] * out->variance[k] * T[b][k];
             S[c][b] = bank_mean(out->probability, sum);
         }
-        if (plan->shares && out->channel[c] <= n) S[c][c] -= plan->shared[out->channel[c]];
     }
-    return tgi_quadratic(count, S, nu, least);
+    for (int c = 0; c < count; c++) {
+        const tg_real least = plan->r[out->channel[c]], inverse = 1 / (S[c][c] > least ? S[c][c] : least);
+        nis += nu[c] * nu[c] * inverse;
+        for (int k = c + 1; k < count; k++) {
+            const tg_real part = S[k][c] * inverse;
+            nu[k] -= part * nu[c];
+            for (int b = c + 1; b <= k; b++) S[k][b] -= part * S[b][c];
+        }
+    }
+    return nis;
 }
 
 /* Probabilities by the modes' likelihoods; returns the mixture's log-likelihood. */

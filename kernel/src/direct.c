@@ -176,44 +176,6 @@ TG_INLINE shock shock_of(const tgi_block *P, tg_lanes a, tg_real a_rho, const in
     return s;
 }
 
-typedef struct { /* S less what neighbouring steps share, of the wheels that are left, and their innovations; the sum of those used out */
-    tg_lanes W[TG_LANES], nu;
-    tg_real sum;
-} nis_square;
-
-/* Take the row with this pivot, at least `least`, and its innovation out of the wheels up to `last`. */
-TG_INLINE void eliminate(nis_square *s, tg_real pivot, tg_real least, tg_real innovation, tg_lanes row, int last)
-{
-    const tg_real inverse = 1 / (pivot > least ? pivot : least), share = innovation * inverse;
-    s->sum += innovation * share;
-    s->nu -= share * row;
-    for (int i = 0; i <= last; i++) s->W[i] -= lanes_at(row, i) * inverse * row;
-}
-
-/* As tgi_nis has it, but v and a_x first; the wheels, a row at once, are to follow. */
-TG_INLINE void nis_begin(const tgi_plan *plan, const channel_updates *t, const shock *a, nis_square *s, const int n)
-{
-    const tgi_block *const P = &t->out->P;
-    const tg_real *const innovation = t->out->result->innovation;
-    const tg_lanes of_v = P->v_omega;
-    tg_lanes of_a = a->omega;
-    s->sum = 0;
-    s->nu = load_wheels(innovation + 1, n);
-    for (int i = 0; i < n; i++) s->W[i] = P->omega[i] + (t->r[1 + i] - plan->shared[1 + i]) * unit(i);
-    tg_real own = a->own + t->r[n + 1], nu_a = innovation[n + 1];
-    if (plan->present[0]) {
-        const tg_real v = lanes_at(P->v_rest, 1) + t->r[0] - plan->shared[0];
-        if (plan->present[n + 1]) {
-            const tg_real k = a->v / v;
-            own -= k * a->v;
-            nu_a -= k * innovation[0];
-            of_a -= k * of_v;
-        }
-        eliminate(s, v, t->r[0], innovation[0], of_v, n - 1);
-    }
-    if (plan->present[n + 1]) eliminate(s, own, t->r[n + 1], nu_a, of_a, n - 1);
-}
-
 /* Channels in the order of the other engine: omega_n..omega_1, v, a_x. */
 TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel_updates *t, const int n)
 {
@@ -222,7 +184,6 @@ TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel
     const tg_lanes a = load_wheels(plan->accelerometer, n);
     const tg_real a_rho = plan->accelerometer[n];
     shock s = {lanes_all(0), lanes_all(0), 0, 0, 0};
-    nis_square left = {.sum = 0};
     for (int i = 0; i < n; i++)
         if (plan->present[1 + i]) expect(f, plan, t, 1 + i, plan->y[1 + i] - lanes_at(out->x.omega, i), lanes_at(P->omega[i], i));
     if (plan->present[0]) expect(f, plan, t, 0, plan->y[0] - lanes_at(out->x.rest, 1), lanes_at(P->v_rest, 1));
@@ -230,12 +191,9 @@ TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel
         s = shock_of(P, a, a_rho, n);
         expect(f, plan, t, n + 1, plan->y[n + 1] - plan->accelerometer_shift - (dot(a, out->x.mu) + a_rho * lanes_at(out->x.rest, 0)), s.own);
     }
-    const int judges = plan->shares && plan->count == n + plan->present[0] + plan->present[n + 1];
-    if (judges) nis_begin(plan, t, &s, &left, n);
     for (int j = n - 1; j >= 0; j--) {
         if (!plan->present[1 + j]) continue;
         const tgi_gain h = {P->omega_mu[j], P->omega_rest[j], P->omega[j]};
-        if (judges) eliminate(&left, lanes_at(left.W[j], j), t->r[1 + j], lanes_at(left.nu, j), left.W[j], j - 1);
         update_channel(t, 1 + j, &h, lanes_at(h.omega, j), plan->y[1 + j] - lanes_at(out->x.omega, j), n);
     }
     if (plan->present[0]) {
@@ -248,8 +206,6 @@ TG_INLINE void update_channels(const tg_filter *f, const tgi_plan *plan, channel
         const tg_real expected = dot(a, out->x.mu) + a_rho * lanes_at(out->x.rest, 0);
         update_channel(t, n + 1, &h, s.own, plan->y[n + 1] - plan->accelerometer_shift - expected, n);
     }
-    out->judged = judges;
-    out->result->nis = left.sum;
 }
 
 TG_INLINE int is_finite(const tgi_direct *out, const int n)
@@ -288,7 +244,7 @@ TG_INLINE int direct_step(const tg_filter *f, const tg_real *P, const tgi_plan *
     out->x.rest = lanes_of(x[n], (x[n + 1] - m.g * x[n]) + dot(m.c, mu) + shift[n + 1], 0, 0);
     out->x.omega = m.phi * omega + m.b * mu + load_wheels(shift + n + 2, n);
     out->x_prior = out->x;
-    out->used = out->judged = 0;
+    out->used = 0;
     out->result->square = 0;
     out->result->volume = 1;
     channel_updates t;

@@ -27,8 +27,7 @@ typedef struct {
     tgi_block P;
     tgi_gain x, x_prior, gain[TG_LANES + 2];
     int32_t used;
-    int32_t judged;     /* nis of the result is there: every wheel was measured, and something is shared */
-    tgi_result *result; /* of it: channels, residuals, innovations, weights, nis, volume */
+    tgi_result *result; /* of it: channels, residuals, innovations, weights, square, volume */
 } tgi_direct;
 
 /* Whether the bound holds and every number is finite; else `out` and its result are of no use. */

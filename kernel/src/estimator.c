@@ -49,8 +49,8 @@ static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step,
     tg_real sum = 0;
     for (int32_t c = 0; c < n + 2; c++) {
         if (isnan(step->innovation[c]) || not_measured >> c & 1) continue;
-        const tg_real w = step->weight[c], shared = c <= n ? row->shared[c] : 0;
-        const tg_real variance = step->innovation_variance[c] - shared + (w < 1 ? r[c] * (1 / w - 1) : 0);
+        const tg_real w = step->weight[c];
+        const tg_real variance = step->innovation_variance[c] + (w < 1 ? r[c] * (1 / w - 1) : 0);
         sum += row->channel_nis[c] = tgi_square(step->innovation[c]) / variance;
         row->outlier |= w < e->settings.outlier_weight;
         count++;
@@ -59,39 +59,11 @@ static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step,
     e->belief.channels = not_measured ? count : step->channels;
 }
 
-/* The inputs as they were over the step that ends now: means of torque and drawbar force, of loads and slope between its ends. */
-static void inputs_over(const tg_estimator *e, const tg_drive *drive, const tg_input *now, tg_input *over)
-{
-    const tg_real d = (tg_real)e->direction;
-    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
-        over->torque[i] = d * drive->mean_torque[i];
-        over->load[i] = (e->held.load[i] + now->load[i]) / 2;
-    }
-    over->drawbar = d * drive->mean_drawbar;
-    over->slope = (e->held.slope + now->slope) / 2;
-    over->mass = now->mass;
-    over->hitch_load = now->hitch_load;
-}
-
-/* Of variance that comes in equal parts after each of `pieces` steps, what is left at the end of wheel speeds, which bearings slow down. */
-static void carry_shared(const tg_filter *f, int32_t pieces, tg_real *shared)
-{
-    for (int32_t i = 0; i < f->wheels; i++) {
-        tg_real part = 1, sum = 0;
-        for (int32_t k = 0; k < pieces; k++) {
-            sum += part;
-            part *= tgi_square(f->passage.phi[i]);
-        }
-        shared[i] *= sum / (tg_real)pieces;
-    }
-}
-
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to restart. */
-static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, const tg_input *now, tg_real dt, tg_real *q)
+static int32_t advance(tg_estimator *e, tg_row *row, const tg_input *now, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
-    tg_input over;
     tg_step step;
     int32_t pieces = 1;
     if (dt > s->max_step) {
@@ -99,16 +71,14 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, cons
         dt /= (tg_real)pieces;
         for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
     }
-    inputs_over(e, drive, now, &over);
     measured(e, row, y, r);
-    tgi_deviations(e, &over, e->belief.x);
+    tgi_deviations(e, now, e->belief.x);
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
-        status = tg_filter_predict(&e->filter, dt, &over, q);
+        status = tg_filter_predict(&e->filter, dt, now, q);
         if (status == TG_OK) tgi_follow(e, &e->deviations);
     }
-    if (pieces > 1 && status == TG_OK) carry_shared(&e->filter, pieces, row->shared);
-    if (status == TG_OK) status = tg_filter_step_shared(&e->filter, dt, &over, now, q, row->shared, y, r, &step);
+    if (status == TG_OK) status = tg_filter_step(&e->filter, dt, now, now, q, y, r, &step);
     if (status != TG_OK) {
         tgi_forget(e);
         tgi_restart_from(e, row, 0);
@@ -164,7 +134,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, const 
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
     if (course == TG_DRIFT) tgi_drift(e, dt);
     else if (course == TG_REST) tgi_rest(e, drive, row->time);
-    else if (course >= TG_START) sound = advance(e, row, drive, now, dt, q);
+    else if (course >= TG_START) sound = advance(e, row, now, dt, q);
     tgi_believe(e);
     return sound;
 }
@@ -293,7 +263,7 @@ static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, 
     tg_input now;
     int32_t was_standing = e->standing, gap, n = e->settings.machine.wheels;
     tg_real dt = e->started ? (tg_real)(row->time - e->time) : 0, travelled = tgi_fabs(e->belief.x[n + 1]);
-    tgi_doubt_speeds(e, row, dt);
+    tgi_doubt_speeds(e, row);
     tgi_watch_shares(e, sample);
     int32_t turned = tgi_track_motion(e, row);
     if (turned) mirror(&e->held, n);

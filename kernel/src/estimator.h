@@ -10,7 +10,6 @@ typedef struct { /* an input between its samples */
     tg_real variance; /* of the filtered value's noise */
     tg_real raw;      /* last sample */
     tg_real calm;     /* last sample that was no spike */
-    tg_real mean;     /* over the step that ends with this row */
     tg_real level;    /* mean square of its increments, spikes clipped */
     tg_real interval; /* s between its last two samples, */
     tg_real rate;     /* 1/s, of the change between them */
@@ -40,7 +39,6 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real ground_variance;
     tg_real turn_variance; /* of the ground speed, by what a turn adds to it at its receiver */
     tg_real doubt[TG_GROUND_SPEED + 1]; /* by place in a sample: variance beside the sensor's, of a spike */
-    tg_real shared[9]; /* of the wheel speeds' and the ground speed's noise: variance that neighbouring steps share, and one step does not have */
     tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */
 } tg_row;
 
@@ -69,8 +67,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
 typedef struct { /* what drives the model between two rows, in the vehicle's own directions */
     tg_real load[8];      /* wheel, N */
     tg_real axle_load[8]; /* N */
-    tg_real torque[8], mean_torque[8]; /* now, and over the step that ends now */
-    tg_real drawbar, mean_drawbar;
+    tg_real torque[8], drawbar;
     tg_real calm_drawbar; /* filtered, for the loads, which carry no uncertainty */
     tg_real mass, inverse_mass; /* kg, as measured, else the machine's */
     tg_real hitch_load;   /* N */
@@ -203,7 +200,7 @@ void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *dri
 
 /* quality.c */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row);
-void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt);
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row);
 tg_real tgi_lowpass(tg_lowpass *f, tg_real x, double time, tg_real tau);
 TG_INLINE int32_t tgi_rolls(const tg_estimator *e, int32_t i) { return e->rolls >> i & 1; }
 int32_t tgi_is_recent(const tg_estimator *e, int32_t slot, double time);
@@ -219,8 +216,8 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 /* inputs.c */
 int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
 void tgi_find_silent(tg_estimator *e, double time);
-void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real dt, tg_real rate);
-void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt);
+void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real rate);
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time);
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);

@@ -35,7 +35,7 @@ const tgi_field tgi_settings_fields[] = {
     REALS(T, algebraic_filter), REALS(T, watch), REALS(T, tuned), END};
 #undef T
 #define T tg_hold
-static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm), REALS(T, mean),
+static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm),
                                  REALS(T, level), REALS(T, rate), REALS(T, bend), REALS(T, bends), REALS(T, interval), REALS(T, spike), DOUBLES(T, time),
                                  INTEGERS(T, count, 0, 100), FLAG(T, fresh), END};
 #undef T

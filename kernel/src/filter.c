@@ -189,7 +189,7 @@ TG_INLINE void report(const tgi_plan *plan, const tgi_result *result, const tg_r
 {
     memset(out, 0, sizeof *out);
     out->channels = result->used;
-    out->nis = result->nis;
+    out->nis = result->square;
     out->log_likelihood = result->log_likelihood;
     out->gamma = plan->gamma;
     for (int o = 0; o < n + 2; o++) {
@@ -229,19 +229,17 @@ TG_INLINE tg_status advance_one(tg_filter *f, const tgi_call *call, tgi_plan *pl
     plan->gamma = gamma_of(f, call, plan);
     noise_scales(f, scale, stride);
     scale_noise(f, scale, plan, n);
-    int formed = 0, judged = 0;
+    int formed = 0;
 #if TGI_DIRECT
     tgi_direct direct;
     direct.result = &result;
     formed = f->tuning.engine == TG_EXACT && n <= TG_LANES && f->factor_steps == 0 && tgi_direct_step(f, plan, &direct);
-    judged = formed && direct.judged;
-    if (formed && (policy != TG_FIXED || (plan->shares && !judged))) tgi_direct_gains(&direct, result.gain, n);
+    if (formed && policy != TG_FIXED) tgi_direct_gains(&direct, result.gain, n);
 #endif
     if (!formed) {
         const tg_status status = step_with_factors(f, plan, &result);
         if (status != TG_OK) return status;
     }
-    if (!judged) result.nis = plan->shares ? tgi_nis(plan, &result, n) : result.square;
     result.log_likelihood = log_likelihood(&result);
     if (!formed && !result_is_finite(&result, n, stride)) return TG_DIVERGED;
     if (policy != TG_FIXED) {
@@ -269,24 +267,18 @@ static tg_status advance(tg_filter *f, const tgi_call *call, tg_step *out)
     return status;
 }
 
-tg_status tg_filter_step_shared(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
-                                const tg_real *shared, const tg_real *y, const tg_real *r, tg_step *out)
-{
-    if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
-    const tgi_call call = {dt, before, now, q_input, shared, y, r};
-    return advance(f, &call, out);
-}
-
 tg_status tg_filter_step(tg_filter *f, tg_real dt, const tg_input *before, const tg_input *now, const tg_real *q_input,
                          const tg_real *y, const tg_real *r, tg_step *out)
 {
-    return tg_filter_step_shared(f, dt, before, now, q_input, NULL, y, r, out);
+    if (!f || !before || !now || !y || !r) return TG_BAD_ARGUMENT;
+    const tgi_call call = {dt, before, now, q_input, y, r};
+    return advance(f, &call, out);
 }
 
 tg_status tg_filter_predict(tg_filter *f, tg_real dt, const tg_input *before, const tg_real *q_input)
 {
     if (!f || !before) return TG_BAD_ARGUMENT;
-    const tgi_call call = {dt, before, before, q_input, NULL, NULL, NULL};
+    const tgi_call call = {dt, before, before, q_input, NULL, NULL};
     return advance(f, &call, NULL);
 }
 

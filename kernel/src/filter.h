@@ -18,10 +18,8 @@ typedef struct { /* one step, worked out before any state is touched; rows in ro
     tg_real accelerometer[TG_ROWS];
     tg_real accelerometer_shift;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS]; /* channels run as rows do, see tgi_channel */
-    tg_real shared[TG_MAX_CHANNELS]; /* of the expected variances of v and omega, what neighbouring steps share, where `shares` */
     int32_t present[TG_MAX_CHANNELS];
     int32_t count;               /* channels present */
-    int32_t shares;              /* any of `shared` is not 0 */
     tg_real cosine[2], sine[2];  /* of the slopes before and now */
     int32_t substeps;
     tg_real gamma;
@@ -38,7 +36,6 @@ typedef struct { /* what a step comes to, before it is known to be sound */
     tg_real residual_variance[TG_MAX_CHANNELS];
     tg_real innovation[TG_MAX_CHANNELS], variance[TG_MAX_CHANNELS], weight[TG_MAX_CHANNELS]; /* prior */
     tg_real square, volume; /* sum of residual^2/variance and product of the variances, over the channels used */
-    tg_real nis;            /* the sum without what neighbouring steps share */
     tg_real log_likelihood;
 } tgi_result;
 
@@ -87,11 +84,6 @@ tg_status tgi_bank_step(tg_filter *f, tgi_plan *plan, tg_step *out);
 void tgi_bank_moments(const tg_filter *f, tg_real *x, tg_real *P); /* row order, P by rows of `stride` */
 void tgi_bank_restart(tg_filter *f, const tg_real *outputs, tg_passage *passage);
 void tgi_bank_factors_of(const tg_filter *f, int mode, tg_real *u, tg_real *d); /* as tgi_factors_of */
-
-/* nis.c: S of the channels used to nu' S^-1 nu, S less what neighbouring steps share, as a filter with one lane left it. */
-tg_real tgi_nis(const tgi_plan *plan, const tgi_result *result, int n);
-/* nu' S^-1 nu of `count` channels, by the lower triangle of S; both are used up. No pivot falls below `least`. */
-tg_real tgi_quadratic(int count, tg_real (*S)[TG_MAX_CHANNELS], tg_real *nu, const tg_real *least);
 
 /* smoother.c: rows of X: row <- row M^-1, by Cholesky of the symmetric M, which is overwritten. 0 where M is not positive definite. */
 int tgi_divide_rows(int states, int stride, tg_real *M, tg_real *X);

@@ -9,16 +9,14 @@
 #define TG_AHEAD 4 /* intervals that the change over one of them is continued at most: of two samples at nearly one instant it is their noise */
 
 /* An input itself is filtered as a random walk in noise, with a time constant of at most `lag`: between two wheel speeds a raw
- * torque's noise would shake omega more than the wheel ever does. Its mean over the row's step is that of a straight line since the last
- * sample, when it was `before`. */
-static void track(tg_hold *h, tg_real x, tg_real before, tg_real noise, tg_real interval, tg_real dt, tg_real lag)
+ * torque's noise would shake omega more than the wheel ever does. */
+static void track(tg_hold *h, tg_real x, tg_real noise, tg_real interval, tg_real lag)
 {
     tg_real prior = h->variance + tgi_motion(h, noise), gain = prior / (prior + noise * noise);
     const tg_real least = interval / (lag + interval);
     if (!(gain > least)) gain = least;
     h->value += gain * (x - h->value);
     h->variance = gain * noise * noise;
-    h->mean = x - (x - before) * (dt < interval ? dt / interval : 1) / 2;
 }
 
 /* The value before a sample that follows a spike: the spike's own where the sample confirms it, else the last one that was none. */
@@ -31,24 +29,23 @@ static tg_real before_spike(const tg_hold *h, tg_real x)
 static void begin(tg_hold *h, tg_real x, tg_real noise)
 {
     h->fresh = h->count > 0;
-    h->value = h->calm = h->mean = x;
+    h->value = h->calm = x;
     h->variance = noise * noise;
     h->rate = h->bend = h->spike = 0;
 }
 
-/* Add the row's sample at `slot`, if it has one, the row before it being dt old. The mean square of the input's increments is kept over
+/* Add the row's sample at `slot`, if it has one. The mean square of the input's increments is kept over
  * about 1 s; one far beyond it is a spike: until the next sample confirms it, the value before it is kept, its square counts as uncertainty,
  * and it enters the mean square clipped. `rate`: the change a second that is no spike, 0 where it is not known; it counts over the usual
  * interval at most, since within a gap nearly everything is possible. Where it is known, of a speed, a spike is one from the first samples on,
  * else only once the increments are known, and what drives the model between samples is worked out. Increments of a standstill show nothing
  * of the start. */
-void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real dt, tg_real rate)
+void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real rate)
 {
     const tg_tuned *const k = &e->settings.tuned;
     const int32_t moving = !e->standing;
     const tg_real x = row->value[slot], noise = e->settings.noise[slot], interval = (tg_real)(row->time - h->time);
     h->fresh = 0;
-    h->mean = h->calm;
     if (isnan(x)) return;
     if (h->count == 0 || interval > e->settings.gap + TG_PAUSE * h->interval) begin(h, x, noise);
     else {
@@ -58,10 +55,10 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
         h->spike = 0;
         if ((h->count > TG_LEAST_SAMPLES || rate > 0) && change > most + tgi_square(rate * usual)) {
             h->spike = change;
-            h->mean = h->calm = before;
+            h->calm = before;
             change = most;
         } else {
-            if (!(rate > 0)) track(h, x, before, noise, interval, dt, k->input_lag);
+            if (!(rate > 0)) track(h, x, noise, interval, k->input_lag);
             h->calm = x;
             const tg_real ahead = TG_AHEAD * h->interval;
             h->bend = h->count > 1 ? tgi_square(x - before - h->rate * (interval < ahead ? interval : ahead)) : 0;
@@ -80,9 +77,8 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
 }
 
 /* The leap was the vehicle's own. */
-static void believe_leap(tg_hold *h, tg_real dt)
+static void believe_leap(tg_hold *h)
 {
-    h->mean = h->raw - (h->raw - h->calm) * (dt < h->interval ? dt / h->interval : 1) / 2;
     h->bend = h->spike;
     h->rate = (h->raw - h->calm) / h->interval;
     h->value = h->calm = h->raw;
@@ -92,7 +88,7 @@ static void believe_leap(tg_hold *h, tg_real dt)
 
 /* Of `among` inputs of the wheels, leaps of most at the same instant, one way and alike to a factor of two, are a manoeuvre, no spikes.
  * `rate`: what each is capable of in a second, where that is known. */
-void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time, tg_real dt)
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time)
 {
     tg_real leap[8];
     int32_t leaps = 0;
@@ -108,18 +104,18 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t am
             const tg_real twice = 2 * leap[i] * leap[j];
             alike += twice > tgi_square(leap[i]) && twice > tgi_square(leap[j]);
         }
-        if (alike > 1 && 2 * alike > among) believe_leap(&h[i], dt);
+        if (alike > 1 && 2 * alike > among) believe_leap(&h[i]);
     }
 }
 
-/* Error of one input as extra variance of its state over the step that ends at `time`. Where the step ends with a sample, the mean over
- * it is known except for the noise of two samples and the input's deviation from the straight line. Each sample's noise is half of two
- * means, so that neighbouring steps share it: of one mean the variance is noise^2/2, but over many steps, over which an adhesion is
- * averaged, it adds up as noise^2 a step does. A ramp does not deviate; an input that walks at random (Brownian bridge) or jumps at
- * some instant in between adds the twelfth of its squared increment, and its second difference has two of these squares, and six of the
- * noise. Where the step does not end with a sample, the last value is used: its error stays the same, so that `age` after it it has moved
- * the state by (age error), and this step adds error^2 (age^2 - (age - dt)^2); and the input continues as a random walk w, of whose
- * integral the variance is w age^3/3. `unknown` is the variance before the first sample and once the last one is older than a gap. */
+/* Error of one input as extra variance of its state over the step that ends at `time`. A step that ends with a sample uses it whole: a
+ * wheel's slip settles within milliseconds, so that the torque of an instant is the adhesion of that instant
+ * (docs/decisions/0096). Its error is the sample's noise, and what the input does beside the straight line
+ * since the last one: a ramp does nothing; an input that walks at random (Brownian bridge) or jumps at some instant in between adds the
+ * twelfth of its squared increment, and its second difference has two of these squares, and six of the noise. Where the step does not end
+ * with a sample, the last value is used: its error stays the same, so that `age` after it it has moved the state by (age error), and this
+ * step adds error^2 (age^2 - (age - dt)^2); and the input continues as a random walk w, of whose integral the variance is w age^3/3.
+ * `unknown` is the variance before the first sample and once the last one is older than a gap. */
 static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
 {
     if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
@@ -130,14 +126,6 @@ static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, 
     const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
     const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
     return dt * (2 * age - dt) * constant + tgi_walk(h, noise) * (age * age * age - since * since * since) / 3;
-}
-
-/* Of held_noise, what one step alone does not have where it ends with a sample: its mean leans on the last sample too. */
-static tg_real shared_noise(const tg_hold *h, tg_real dt, tg_real noise)
-{
-    const tg_real part = dt < h->interval ? dt / h->interval : 1;
-    if (!h->fresh || h->count < 2) return 0;
-    return tgi_square(dt * noise) * (part - part * part / 2);
 }
 
 /* Factor on the random walks in use: of the bank the mean over its modes, as they may have changed in dt. */
@@ -225,17 +213,12 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
         row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);
         if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * dt / e->wheel[i].interval;
     }
-    memset(row->shared, 0, sizeof row->shared);
     for (int32_t i = 0; i < n; i++)
-        if (s->driven[i]) {
-            row->shared[i] = shared_noise(&e->torque[i], dt, s->noise[TG_DRIVE_TORQUE + i]) * tgi_square(e->filter.inverse_inertia[i]);
+        if (s->driven[i])
             q[i] += held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(e->filter.inverse_inertia[i]);
-        }
-    if (e->drawbar.count > 0 || s->towing) {
-        row->shared[n] = shared_noise(&e->drawbar, dt, s->noise[TG_DRAWBAR_FORCE]) * tgi_square(drive->inverse_mass);
+    if (e->drawbar.count > 0 || s->towing)
         q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);
-    }
     if (e->braked) brake_noise(e, row, dt, q);
     if (e->pitch.count > 0)
         q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
@@ -249,22 +232,20 @@ void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive
     if (e->braked || !isnan(row->value[TG_BRAKE])) watch_brake(e, row);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
-        tgi_hold_update(e, &e->torque[i], row, TG_DRIVE_TORQUE + i, dt, 0);
+        tgi_hold_update(e, &e->torque[i], row, TG_DRIVE_TORQUE + i, 0);
         driven++;
     }
-    tgi_judge_leaps(e->torque, NULL, s->machine.wheels, driven, row->time, dt);
+    tgi_judge_leaps(e->torque, NULL, s->machine.wheels, driven, row->time);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         const tg_hold *const h = &e->torque[i];
         drive->torque[i] = h->calm;
-        drive->mean_torque[i] = h->mean;
         row->outlier |= h->spike > 0;
     }
-    tgi_hold_update(e, &e->drawbar, row, TG_DRAWBAR_FORCE, dt, 0);
-    tgi_hold_update(e, &e->pitch, row, TG_PITCH, dt, 0);
+    tgi_hold_update(e, &e->drawbar, row, TG_DRAWBAR_FORCE, 0);
+    tgi_hold_update(e, &e->pitch, row, TG_PITCH, 0);
     row->outlier |= e->drawbar.spike > 0;
     drive->drawbar = e->drawbar.calm;
-    drive->mean_drawbar = e->drawbar.mean;
     drive->calm_drawbar = e->drawbar.value;
     tgi_weigh(e, row, drive);
     tgi_slope_update(e, row, e->pitch.value, dt, drive);

@@ -12,7 +12,7 @@ static void bounded_input(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot
     tg_real *const x = &row->value[slot];
     const int32_t defect = *x < least || *x > most;
     if (defect) *x = (tg_real)NAN;
-    tgi_hold_update(e, h, row, slot, 0, 0);
+    tgi_hold_update(e, h, row, slot, 0);
     row->outlier |= defect || (h->spike > 0 && h->time == row->time);
 }
 
@@ -86,7 +86,7 @@ static void use_measured(tg_estimator *e, const tg_row *row, tg_real weight, tg_
     tg_real rest = weight, computed = 0, share = 0;
     for (int32_t k = 0; k < s->axles; k++) {
         tg_hold *h = &e->axle_load[k];
-        tgi_hold_update(e, h, row, TG_VERTICAL_LOAD + k, 0, 0);
+        tgi_hold_update(e, h, row, TG_VERTICAL_LOAD + k, 0);
         measured[k] = h->count > 0 && row->time - h->time <= 1;
         any |= measured[k];
         if (measured[k]) {
@@ -116,7 +116,6 @@ static void oppose_turning(const tg_estimator *e, tg_drive *drive)
         tg_real less = s->drive_friction[i] * way;
         if (d * way < 0) less += 2 * way * s->machine.radius[i] * s->machine.tire_rolling_resistance * drive->load[i];
         drive->torque[i] -= less;
-        drive->mean_torque[i] -= less;
     }
 }
 

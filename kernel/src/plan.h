@@ -7,7 +7,7 @@
 typedef struct {
     tg_real dt;
     const tg_input *before, *now;
-    const tg_real *q_input, *shared, *y, *r; /* q_input, shared may be null: none. y null: predict only */
+    const tg_real *q_input, *y, *r; /* q_input may be null: none. y null: predict only */
 } tgi_call;
 
 /* Cosine and sine of a slope, remembered for the two last ones: most steps repeat them. */
@@ -86,17 +86,8 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
 /* Which channels are there; the row of H of a_x with the inputs of its instant (physics.md 1). */
 TG_INLINE tg_status plan_channels(const tg_filter *f, const tgi_call *call, tgi_plan *plan, const int n)
 {
-    tg_real zero = 0, all = 0;
+    tg_real zero = 0;
     int count = 0, positive = 1;
-    for (int i = 0; call->shared && i < n; i++) {
-        plan->shared[1 + i] = call->shared[i];
-        all += call->shared[i];
-        positive &= !(call->shared[i] < 0);
-    }
-    plan->shared[0] = call->shared ? call->shared[n] : 0;
-    plan->shares = all + plan->shared[0] != 0; /* a NaN is refused below */
-    positive &= !(plan->shared[0] < 0);
-    zero += (all + plan->shared[0]) * 0;
     for (int o = 0; o < n + 2; o++) {
         const tg_real y = call->y[tgi_channel(n, o)], r = call->r[tgi_channel(n, o)];
         plan->present[o] = y == y;
@@ -143,7 +134,7 @@ TG_INLINE tg_status plan_step(const tg_filter *f, const tgi_call *call, tgi_plan
     tg_status status = plan_check_input(call->before, n);
     if (status != TG_OK) return status;
     plan->before = call->before;
-    plan->count = plan->shares = 0;
+    plan->count = 0;
     if (call->y) {
         status = plan_check_input(call->now, n);
         if (status == TG_OK) status = plan_channels(f, call, plan, n);

@@ -86,13 +86,13 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
  * is capable of is no spike; after a gap, of most wheels together. A jump of the accelerometer, which the slope and the loads would keep,
  * is left out until then. */
-void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
+void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
 {
     const tg_real *const rate = e->constants.agility;
     const int32_t n = e->settings.machine.wheels;
-    for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, 0, rate[i]);
-    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, 0, rate[TG_GROUND_SPEED]);
-    tgi_judge_leaps(e->wheel, rate, n, n, row->time, dt);
+    for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, rate[i]);
+    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, rate[TG_GROUND_SPEED]);
+    tgi_judge_leaps(e->wheel, rate, n, n, row->time);
     for (int32_t i = 0; i <= n; i++) {
         const tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
         const tg_real doubt = h->time == row->time ? h->spike : 0;
@@ -100,7 +100,7 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row, tg_real dt)
         row->outlier |= doubt > 0;
     }
     tg_hold *const a = &e->forward;
-    tgi_hold_update(e, a, row, TG_ACCELERATION_X, 0, 0);
+    tgi_hold_update(e, a, row, TG_ACCELERATION_X, 0);
     if (a->spike > 0 && a->time == row->time) {
         row->value[TG_ACCELERATION_X] = (tg_real)NAN;
         row->outlier = 1;

@@ -326,7 +326,7 @@ void tgi_speeds_update(tg_estimator *e, tg_row *row, tg_estimate *out)
     if (e->standing) tgi_rest_reading(e, row);
     else tgi_rest_over(e);
     if (!e->started) e->ground_time = row->time;
-    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, 0, 0);
+    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, 0);
     tgi_reckon_speeds(e, dt, row);
     samples_of(e, row, s, &in);
     e->belief.nis = 0;

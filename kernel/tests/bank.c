@@ -54,7 +54,7 @@ static double one_problem(int n, double huber, double missing)
     const int states = 2 * n + 2;
     const tg_machine m = random_machine(n);
     tg_tuning t = tg_default_tuning();
-    tg_real x[NX], P[NX * NX], y[NY], r[NY], q[NX], shared[NX];
+    tg_real x[NX], P[NX * NX], y[NY], r[NY], q[NX];
     wide truth[NX], clock = 0, mixed_at = 0;
     double worst = 0;
     int updates = 0;
@@ -84,10 +84,7 @@ static double one_problem(int n, double huber, double missing)
             if (uniform(0, 1) < missing || k % 13 == 12) y[c] = (tg_real)NAN;
             present += y[c] == y[c];
         }
-        for (int e = 0; e < states; e++) {
-            q[e] = (tg_real)uniform(0, 1e-4);
-            shared[e] = q[e] / 2;
-        }
+        for (int e = 0; e < states; e++) q[e] = (tg_real)uniform(0, 1e-4);
         if (present && ++updates % t.mix_stride == 0) {
             mix(states, clock - mixed_at, &t);
             mixed_at = clock;
@@ -98,13 +95,12 @@ static double one_problem(int n, double huber, double missing)
             dense_predict(&modes[i], &m, dt, &before, total);
         }
         clock += dt;
-        CHECK(tg_filter_step_shared(&f, dt, &before, &now, q, shared, y, r, &step) == TG_OK, "step %d", k);
+        CHECK(tg_filter_step(&f, dt, &before, &now, q, y, r, &step) == TG_OK, "step %d", k);
         CHECK(step.channels == present, "channels");
         CHECK(factors_are_sound(&f, states, TG_MODES), "positive definite");
         if (present) {
             dense prior = mixture(states), plain = prior;
             wide weights[NY], largest = -1e30L, sum = 0;
-            for (int c = 0; c <= n; c++) prior.shared[c] = shared[c];
             dense_update(&prior, &m, &now, y, r, huber, NULL);
             dense_update(&plain, &m, &now, y, r, 0, NULL);
             for (int a = 0; a < prior.count; a++) {

@@ -90,14 +90,12 @@ typedef struct {
     wide F[NX][NX], shift[NX]; /* of the last step */
     wide nu[NY], S[NY][NY], weight[NY], K[NX][NY];
     int taken[NY], count;        /* channels, in order */
-    wide shared[NY]; /* the caller's: of S, what neighbouring steps share, which nis is taken without */
     wide nis, log_likelihood;
 } dense;
 
 static inline void dense_moments(dense *d, const tg_machine *m, const tg_real *x, const tg_real *P)
 {
     d->n = m->wheels;
-    for (int c = 0; c < NY; c++) d->shared[c] = 0;
     for (int i = 0; i < 2 * d->n + 2; i++) {
         d->x[i] = x[i];
         for (int j = 0; j < 2 * d->n + 2; j++) d->P[i][j] = P[i * (2 * d->n + 2) + j];
@@ -234,11 +232,8 @@ static inline void dense_update(dense *d, const tg_machine *m, const tg_input *n
         }
     }
     memcpy(inverse, d->S, sizeof inverse);
-    for (int a = 0; a < d->count; a++) inverse[a][a] -= d->shared[d->taken[a]];
     invert(d->count, inverse, &logs);
     d->nis = dense_square(d, inverse);
-    memcpy(inverse, d->S, sizeof inverse);
-    invert(d->count, inverse, &logs);
     wide IKH[NX][NX], T[NX][NX];
     for (int i = 0; i < states; i++)
         for (int k = 0; k < states; k++) IKH[i][k] = i == k;

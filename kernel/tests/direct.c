@@ -16,7 +16,7 @@ static void drive(int n, double sensors, double missing, int accelerometer, doub
     tg_tuning t = tg_default_tuning();
     static tg_filter f;
     static dense d;
-    tg_real x[NX], P[NX * NX] = {0}, y[NY], r[NY], q[NX] = {0}, shared[NX] = {0};
+    tg_real x[NX], P[NX * NX] = {0}, y[NY], r[NY], q[NX] = {0};
     wide noise[NX], truth[NX];
     tg_input before = random_input(&m);
     t.huber = (tg_real)huber;
@@ -41,14 +41,13 @@ static void drive(int n, double sensors, double missing, int accelerometer, doub
         }
         for (int e = 0; e < states; e++) {
             if (e <= n) q[e] = t.walk[e] * dt;
-            if (e <= n) d.shared[e] = shared[e] = k % 5 ? q[e] / 2 : 0; /* every fifth step as one that shares nothing */
             noise[e] = (wide)t.walk[e] * dt + q[e];
         }
         dense_predict(&d, &m, dt, &before, noise);
         if (k % 37 == 20) {
             CHECK(tg_filter_predict(&f, dt, &before, q) == TG_OK, "predict");
         } else {
-            CHECK(tg_filter_step_shared(&f, dt, &before, &now, q, shared, y, r, &step) == TG_OK, "step %d", k);
+            CHECK(tg_filter_step(&f, dt, &before, &now, q, y, r, &step) == TG_OK, "step %d", k);
             dense_update(&d, &m, &now, y, r, huber, NULL);
             CHECK(step.channels == d.count, "channels");
             seen.worst = fmax(seen.worst, fabs((double)(step.nis - d.nis)) / (1 + (double)d.nis));

@@ -9,7 +9,7 @@ static double one_problem(int n, int engine, double huber, double missing, int s
     tg_tuning t = tg_default_tuning();
     static tg_filter f;
     static dense d;
-    tg_real x[NX], P[NX * NX], y[NY], r[NY], q[NX], shared[NX];
+    tg_real x[NX], P[NX * NX], y[NY], r[NY], q[NX];
     wide total[NX], truth[NX];
     double worst = 0;
     tg_input before = random_input(&m);
@@ -36,14 +36,12 @@ static double one_problem(int n, int engine, double huber, double missing, int s
         for (int e = 0; e < states; e++) {
             q[e] = uniform(0, 1) < 0.5 ? 0 : (tg_real)uniform(0, 1e-4);
             total[e] = (wide)t.walk[e] * (tg_real)dt + q[e];
-            shared[e] = q[e] / (tg_real)(2 + k % 3);
-            if (e <= n) d.shared[e] = shared[e];
         }
         dense_predict(&d, &m, (tg_real)dt, &before, total);
         if (k % 11 == 5) { /* a step of prediction alone */
             CHECK(tg_filter_predict(&f, (tg_real)dt, &before, q) == TG_OK, "predict");
         } else {
-            const tg_status status = tg_filter_step_shared(&f, (tg_real)dt, &before, &now, q, shared, y, r, &step);
+            const tg_status status = tg_filter_step(&f, (tg_real)dt, &before, &now, q, y, r, &step);
             CHECK(status == TG_OK, "step %d: status %d", k, (int)status);
             dense_update(&d, &m, &now, y, r, huber, NULL);
             CHECK(step.channels == d.count, "channels");

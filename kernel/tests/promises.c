@@ -63,9 +63,6 @@ static void filter_floor(int n, int engine, int policy)
     REFUSED(tg_filter_init(&f, NULL, &t, x, P));
     REFUSED(tg_filter_step(&f, (tg_real)0.01, NULL, &u, q, y, r, &step));
     REFUSED(tg_filter_step(&f, -1, &u, &u, q, y, r, &step));
-    q[n] = (tg_real)-1e-9;
-    REFUSED(tg_filter_step_shared(&f, (tg_real)0.01, &u, &u, NULL, q, y, r, &step));
-    q[n] = 0;
     REFUSED(tg_filter_predict(&f, -1, &u, q));
     REFUSED(tg_filter_predict(&f, (tg_real)0.01, NULL, q));
     REFUSED(tg_filter_restart(&f, -1, y, r));
@@ -95,8 +92,6 @@ static void filter_floor(int n, int engine, int policy)
         WITH(u.torque[0], tg_filter_predict(&f, (tg_real)0.01, &u, q));
         WITH(q[states - 1], tg_filter_step(&f, (tg_real)0.01, &u, &u, q, y, r, &step));
         WITH(r[n], tg_filter_step(&f, (tg_real)0.01, &u, &u, q, y, r, &step));
-        WITH(q[0], tg_filter_step_shared(&f, (tg_real)0.01, &u, &u, NULL, q, y, r, &step));
-        WITH(q[n], tg_filter_step_shared(&f, (tg_real)0.01, &u, &u, NULL, q, y, r, &step));
         if (k > 0) WITH(y[0], tg_filter_step(&f, (tg_real)0.01, &u, &u, q, y, r, &step));
         WITH(deviations.wheel_acceleration[n - 1][1], tg_consider_step(&c, &f, &deviations));
         WITH(deviations.accelerometer[0], tg_consider_step(&c, &f, &deviations));

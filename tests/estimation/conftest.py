@@ -31,7 +31,6 @@ class Instant:
     y: NDArray[np.float64]
     r: NDArray[np.float64]
     restart: tuple[float, NDArray[np.float64], NDArray[np.float64]] | None = None
-    shared: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,6 @@ def make_problem(
     half, and a load on the hitch that comes and goes.
     """
     rng = np.random.default_rng(seed)
-    sharing = np.random.default_rng([seed, 1])
     machine = random_machine(rng, wheels)
     model = TractionModel(machine)
     n, nx = wheels, 2 * wheels + 2
@@ -132,8 +130,7 @@ def make_problem(
             truth[: n + 1] += rng.normal(0, 0.3, n + 1)
             walk_time = rng.choice([0.0, 3.0])
             restart = (walk_time, truth[: n + 1] + rng.normal(0, 0.1, n + 1), 10 ** rng.uniform(-4, 0, n + 1))
-        shared = sharing.uniform(0, 0.5, n + 1) * q_input[: n + 1]
-        instants.append(Instant(float(dt), before, now, q_input, y, r, restart, shared))
+        instants.append(Instant(float(dt), before, now, q_input, y, r, restart))
         before = now
     return Problem(machine, walk, x0, P0, instants)
 

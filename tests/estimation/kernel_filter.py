@@ -39,17 +39,15 @@ class KernelFilter:
         q_input: Array,
         y: Array,
         r: Array,
-        shared: Array | None = None,
     ) -> Report:
         out = ffi.new("tg_step *")
         checked(
-            lib.tg_filter_step_shared(
+            lib.tg_filter_step(
                 self.pointer,
                 dt,
                 kernel_input(before),
                 kernel_input(now),
                 reals(q_input),
-                ffi.NULL if shared is None else reals(shared),
                 reals(y),
                 reals(r),
                 out,
@@ -152,7 +150,7 @@ def report(step: Step) -> Report:
         "innovation": update.innovation,
         "innovation variance": np.where(update.present, update.innovation_variance, np.nan),
         "weight": np.where(update.present, update.weight, np.nan),
-        "nis": np.array(step.nis),
+        "nis": np.array(update.nis),
         "log-likelihood": np.array(update.log_likelihood),
         "gamma": np.array(step.gamma),
         "adaptation": step.adaptation,

@@ -63,7 +63,7 @@ def errors_by_step(case: Any, tuning: Tuning, tested: Any) -> Iterator[dict[str,
         if k.restart is not None:
             truth.restart(*k.restart)
             tested.restart(*k.restart)
-        arguments = (k.dt, k.before, k.now, k.q_input, k.y, k.r, k.shared)
+        arguments = (k.dt, k.before, k.now, k.q_input, k.y, k.r)
         got = tested.step(*arguments)
         errors = step_errors(report(got) if isinstance(got, Step) else got, report(truth.step(*arguments)))
         errors["mean"], errors["covariance"] = moments_error(tested.moments(), truth.moments())
@@ -117,9 +117,7 @@ def test_the_long_problem_exercises_what_it_should(policy, long_problem):
         long_problem.x0,
         long_problem.P0,
     )
-    reports = [
-        tested.step(k.dt, k.before, k.now, k.q_input, k.y, k.r, k.shared) for k in long_problem.instants
-    ]
+    reports = [tested.step(k.dt, k.before, k.now, k.q_input, k.y, k.r) for k in long_problem.instants]
     assert sum(k.restart is not None for k in long_problem.instants) > 20
     assert sum(np.isnan(r["innovation"]).all() for r in reports) > 20
     assert np.mean([np.nanmin(r["weight"], initial=1.0) < 1 for r in reports]) > 0.01

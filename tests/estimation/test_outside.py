@@ -140,6 +140,21 @@ def test_adhesion_does_not_lag_a_torque_that_comes_with_every_row(method: str, m
     assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > 0.975
 
 
+@pytest.mark.parametrize(("rate", "least"), [(20.0, 0.98), (10.0, 0.97), (5.0, 0.95)])
+def test_adhesion_of_a_row_is_that_of_its_torque(rate: float, least: float) -> None:
+    """The mean of two rows' torques is half a row old: R² was .965, .92 and .73 (docs/decisions/0166)."""
+    d = robot(rate)
+    estimates = estimate(d.recording, d.vehicle)
+    rows = slice(int(3 * rate), None)
+    assert r2(d.adhesion[rows], estimates["adhesion_rr"][rows]) > least
+
+
+def test_adhesion_of_a_tractor_at_one_row_a_second() -> None:
+    """It was .68."""
+    d = tractor()
+    assert r2(d.adhesion[5:], estimate(d.recording, d.vehicle)["adhesion_rr"][5:]) > 0.85
+
+
 def test_a_coarse_torque_is_averaged() -> None:
     """Noise of 10 N m, rounded to 20: R² was .45 while each step's mean torque counted as independent of the last one's."""
     d = robot()

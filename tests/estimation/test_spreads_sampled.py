@@ -86,4 +86,4 @@ def test_a_wheel_that_surely_does_not_pull_has_an_efficiency_of_0_without_doubt(
     for wheel in WHEELS:
         assert np.all(pushed.truth[f"net_traction_{wheel}"] < -0.09)
         assert np.all(estimates[f"efficiency_{wheel}"][1000:] == 0)
-        assert np.all(estimates[f"efficiency_{wheel}_std"][1000:] < 0.01)
+        assert np.all(estimates[f"efficiency_{wheel}_std"][1000:] < 0.02)

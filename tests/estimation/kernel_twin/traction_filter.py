@@ -20,7 +20,6 @@ from kernel_twin.filters import (
     Prediction,
     Update,
     Vector,
-    score,
 )
 from kernel_twin.supervisor import RULES, DriveSupervisor, SpeedSupervisor
 from kernel_twin.traction import Input, Machine, TractionModel
@@ -60,8 +59,6 @@ class Step:
     """What one step did."""
 
     update: Update | BankUpdate
-    nis: Any
-    """νᵀ (S - D)⁻¹ ν, where D is what neighbouring steps share of the noise; of the present channels, with the weighted R."""
     gamma: Any
     """The supervisor's γ; 1 for adaptive, 0 for fixed and bank."""
     adaptation: Vector
@@ -157,7 +154,6 @@ class TractionFilter:
         q_input: ArrayLike,
         y: ArrayLike,
         r: ArrayLike,
-        shared: ArrayLike | None = None,
     ) -> Step:
         """Predict over dt with ``before`` held, then update with the channels of y that are numbers.
 
@@ -165,13 +161,12 @@ class TractionFilter:
         ----------
         q_input: (2n+2,), variance that this step adds to each state on top of the walk.
         y: (n+2,), NaN is missing. r: (n+2,), their variances. now: the input at the instant of y.
-        shared: (n+1,), the part of q_input of (ω, v) that neighbouring steps share: NIS is taken without it, the estimate is not.
         """
         self.time = self.time + self.dtype.type(dt)
         now = now.in_precision(self.dtype)
         if self.tuning.policy == "supervised":
             self._gamma = self._supervise(np.asarray(y, self.dtype), now)
-        return self._advance(dt, before, now, q_input, y, r, shared)
+        return self._advance(dt, before, now, q_input, y, r)
 
     def predict(self, dt: float, before: Input, q_input: ArrayLike) -> None:
         """A step without any measurement; the supervisor's γ stays as it was."""
@@ -188,7 +183,6 @@ class TractionFilter:
         q_input: ArrayLike,
         y: ArrayLike,
         r: ArrayLike,
-        shared: ArrayLike | None = None,
     ) -> Step:
         before, dt = before.in_precision(self.dtype), self.dtype.type(dt)
         y, q_input = np.asarray(y, self.dtype), np.asarray(q_input, self.dtype)
@@ -198,21 +192,15 @@ class TractionFilter:
             self._bank.predict(before, dt, extra=q_input, measured=not np.isnan(y).all())
             seen = [self._observation(lane, now) for lane in self._bank.filters]
             mixed = self._bank.update(y, R=R, seen=seen)
-            return Step(mixed, self._nis(mixed, shared), self._gamma, unadapted, None)
+            return Step(mixed, self._gamma, unadapted, None)
         if self._adaptive is None:
             prediction = self._single.predict(before, dt, Q=np.diag(self.walk * dt + q_input))
             plain = self._single.update(y, R=R, seen=self._observation(self._single, now))
-            return Step(plain, self._nis(plain, shared), self._gamma, unadapted, prediction)
+            return Step(plain, self._gamma, unadapted, prediction)
         scale = self._adaptive.adaptation.scale
         prediction = self._adaptive.predict(before, dt, gamma=self._gamma, extra=q_input)
         update = self._adaptive.update(y, dt, R=R, seen=self._observation(self._single, now))
-        return Step(update, self._nis(update, shared), self._gamma, scale, prediction)
-
-    def _nis(self, update: Update | BankUpdate, shared: ArrayLike | None) -> Any:
-        if shared is None:
-            return update.nis
-        less = np.append(np.asarray(shared, self.dtype), 0)[update.present]  # a_x reads none of it
-        return score(update.innovation[update.present], update.innovation_covariance - np.diag(less))[0]
+        return Step(update, self._gamma, scale, prediction)
 
     def _observation(self, filter: GaussianFilter, now: Input) -> Observation:
         """What the filter expects of the channels with the input ``now``."""
