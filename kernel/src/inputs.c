@@ -197,6 +197,16 @@ static void brake_noise(const tg_estimator *e, const tg_row *row, tg_real dt, tg
     }
 }
 
+/* In a turn on the spot the soil holds one side back and pushes the other on: what is left of the resistance that the model takes off the
+ * speed is unknown, up to all of it. As a force of about a second, (m/s^2)^2 s. */
+static tg_real spot_force(const tg_estimator *e)
+{
+    const tg_settings *s = &e->settings;
+    const int32_t n = s->machine.wheels;
+    const tg_real side = tgi_fabs(s->wheel_side[n - 1] * e->yaw_rate), v = tgi_fabs(e->belief.x[n + 1]);
+    return side > v ? tgi_square((1 - v / side) * e->belief.x[n] * s->machine.gravity) : 0;
+}
+
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar
  * force and slope move v). */
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q)
@@ -207,7 +217,7 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     const int32_t n = s->machine.wheels;
     const tg_real hills = unseen_hills(e);
     for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] = 0;
-    q[n] = walking_forces(e, drive, hills, dt) + drive->drift_by_slope;
+    q[n] = walking_forces(e, drive, hills, dt) + spot_force(e) * dt + drive->drift_by_slope;
     q[2 * n + 1] = hills * dt;
     for (int32_t i = 0; i < n; i++) {
         row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);

@@ -36,6 +36,17 @@ static void move_to_middle(const tg_estimator *e, tg_row *row)
     const tg_real yaw = !isnan(seen) ? seen : row->time - e->yaw_time > 1 ? 0 : e->yaw_rate, across = s->receiver_ahead * yaw;
     row->turn_variance = 0;
     if (yaw == 0 || isnan(there) || (across == 0 && s->receiver_side == 0)) return;
+    /* So near to turning on the spot the square of the speed along is within two of its SDs of 0: its root, of noise alone, would be a speed
+     * to one side. There the square itself corrects the speed as believed. */
+    const tg_real square = tgi_square(there) - tgi_square(across);
+    const tg_real spread = 2 * tgi_sqrt(tgi_square(there * s->noise[TG_GROUND_SPEED]) + tgi_square(across * s->receiver_ahead * s->noise[TG_YAW_RATE]));
+    if (square < 2 * spread && e->seen_motion) {
+        const tg_real v = s->method == TG_SPEEDS ? e->speeds.x[0] : (tg_real)e->direction * e->belief.x[s->machine.wheels + 1];
+        const tg_real before = v - s->receiver_side * yaw, by = 2 * tgi_max(tgi_fabs(before), tgi_sqrt(spread));
+        row->value[TG_GROUND_SPEED] = v + (before < 0 ? -1 : 1) * (square - tgi_square(before)) / by;
+        row->turn_variance = tgi_square(spread / by) + tgi_square(s->receiver_side * s->noise[TG_YAW_RATE]);
+        return;
+    }
     row->value[TG_GROUND_SPEED] = tgi_middle_of(s, there, yaw);
     const tg_real along = tgi_max(tgi_fabs(row->value[TG_GROUND_SPEED] - s->receiver_side * yaw), s->standstill_speed);
     const tg_real by_yaw = tgi_fabs(s->receiver_side) + s->receiver_ahead * s->receiver_ahead * tgi_fabs(yaw) / along;

@@ -56,6 +56,22 @@ def test_between_fixes_a_track_is_known_for_two_seconds_on_either_side() -> None
     np.testing.assert_allclose(speed[[2, 3, 6]], 1.0 + 0.1 * when[[2, 3, 6]])
 
 
+def test_of_a_vehicle_that_turns_on_the_spot_positions_show_no_turn() -> None:
+    """They gave a line between the turns before and behind, of either sign: the gyroscope of an outsider's mower, which was right, turned
+    'with the wheels' speeds and against the positions: check the positions'."""
+    time = np.arange(0.0, 44.0, 0.2)
+    north = 0.8 * np.where(
+        time < 20, time, np.where(time < 24, 20.0, 44.0 - time)
+    )  # there, round in 4 s, and back
+    north += 0.01 * np.random.default_rng(3).standard_normal(len(time))
+    places = {"latitude": 48.0 + north / 111_200.0, "longitude": np.full(len(time), 11.0)}
+    track = track_of(Recording(time, places))
+    assert track is not None
+    turn = track.at("turn", time)
+    assert np.isnan(turn[(time > 20.6) & (time < 23.4)]).all()
+    assert np.nanmax(np.abs(turn[(time > 2) & (time < 18)])) < 0.2
+
+
 def test_where_positions_jump_to_another_correction_no_turn_is_known() -> None:
     """A lane of 3 m for a minute: each jump was a turn, and adhesion three times as far off, without a word."""
     time = np.arange(0.0, 60.0, 0.1)

@@ -62,7 +62,8 @@ class Track:
         return found
 
     def at(self, name: str, time: Floats) -> Floats:
-        """A column at other instants (m,), NaN further from a fix than the window is long."""
+        """A column at other instants (m,), NaN further from a fix than the window is long; ``turn`` also where the vehicle hardly moves: it
+        may turn on the spot, which its positions do not show."""
         values = getattr(self, name)
         known = np.isfinite(values)
         if known.sum() < 2:
@@ -71,6 +72,9 @@ class Track:
         result = np.interp(time, when, values[known])
         place = np.clip(np.searchsorted(when, time), 1, len(when) - 1)
         far = np.minimum(np.abs(time - when[place - 1]), np.abs(time - when[place])) > WINDOW
+        if name == "turn":
+            place = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
+            far |= np.minimum(self.speed[place - 1], self.speed[place]) < _SLOWEST
         return np.where(far, np.nan, result)
 
 
