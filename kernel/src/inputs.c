@@ -204,7 +204,14 @@ static tg_real spot_force(const tg_estimator *e)
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
     const tg_real side = tgi_fabs(s->wheel_side[n - 1] * e->yaw_rate), v = tgi_fabs(e->belief.x[n + 1]);
-    return side > v ? tgi_square((1 - v / side) * e->belief.x[n] * s->machine.gravity) : 0;
+    if (side <= v || side < s->standstill_speed) return 0;
+    tg_real ahead = 0, back = 0; /* a vehicle that is stuck has a rate of turn of noise, and wheels that turn one way */
+    for (int32_t i = 0; i < n; i++) {
+        const tg_real rim = tgi_rolls(e, i) ? 0 : s->rolling_radius[i] * e->belief.x[n + 2 + i];
+        ahead = tgi_max(ahead, rim);
+        back = tgi_max(back, -rim);
+    }
+    return ahead > s->standstill_speed && back > s->standstill_speed ? tgi_square((1 - v / side) * e->belief.x[n] * s->machine.gravity) : 0;
 }
 
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar

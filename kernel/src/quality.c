@@ -40,7 +40,7 @@ static void move_to_middle(const tg_estimator *e, tg_row *row)
      * to one side. There the square itself corrects the speed as believed. */
     const tg_real square = tgi_square(there) - tgi_square(across);
     const tg_real spread = 2 * tgi_sqrt(tgi_square(there * s->noise[TG_GROUND_SPEED]) + tgi_square(across * s->receiver_ahead * s->noise[TG_YAW_RATE]));
-    if (square < 2 * spread && e->seen_motion) {
+    if (square < 2 * spread && tgi_fabs(across) > s->noise[TG_GROUND_SPEED] && e->seen_motion) {
         const tg_real v = s->method == TG_SPEEDS ? e->speeds.x[0] : (tg_real)e->direction * e->belief.x[s->machine.wheels + 1];
         const tg_real before = v - s->receiver_side * yaw, by = 2 * tgi_max(tgi_fabs(before), tgi_sqrt(spread));
         row->value[TG_GROUND_SPEED] = v + (before < 0 ? -1 : 1) * (square - tgi_square(before)) / by;
