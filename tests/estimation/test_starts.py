@@ -81,7 +81,7 @@ def test_wheels_that_swing_in_the_air_do_not_turn_the_vehicle_round():
     channels["drawbar_force"] = channels["drawbar_force"] - np.where(swings, thrust, 0)
     channels["ground_speed"] = np.where(np.arange(len(time)) % 10 == 0, channels["ground_speed"], np.nan)
     found = estimate(replace(made.recording, channels=channels), robot())
-    assert np.abs(found["ground_speed"] - made.truth["ground_speed"])[swings].max() < 0.35
+    assert np.abs(found["ground_speed"] - made.truth["ground_speed"])[swings].max() < 0.3
     assert np.abs(found["adhesion_fl"] - made.truth["adhesion_fl"])[swings].max() < 0.35
 
 
