@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 
 import numpy as np
@@ -99,14 +98,12 @@ def test_two_measures_of_the_push_undo_each_others_errors(vehicle: Vehicle) -> N
     z, direct = [], []
     for seed in range(12):
         log = hilly(np.random.default_rng(seed), 0.05, push_noise=0.4, pitch_noise=0.04)
-        with contextlib.suppress(InputError):  # its interval may hold 0: the errors are as large as the push
-            scale = identify_torque_scale(log, vehicle)
-            z.append((scale.value - 0.05) / scale.std)
+        scale = identify_torque_scale(log, vehicle)
+        z.append((scale.value - 0.05) / scale.std)
         alone = Recording(log.time, {n: x for n, x in log.channels.items() if n != "pitch"})
         direct.append(identify_torque_scale(alone, vehicle).value)
     # The accelerometer alone, as noisy as the signal, would halve the scale.
     assert np.mean(direct) < 0.035
-    assert len(z) >= 11
     assert abs(np.mean(z)) < 0.8
     assert np.mean(np.abs(z) < 2) >= 0.9
 
@@ -247,9 +244,9 @@ def test_resistance_that_goes_with_the_grade_does_not_make_it_sure_and_wrong(
 def test_braking_that_is_shorter_than_the_windows_does_not_make_it_larger(
     vehicle: Vehicle, without: tuple[str, ...]
 ) -> None:
-    """From .6 m/s up to 4.2 in 6 s and down in one, or in two smooth ones, without end: it was 1.3 to 1.7, and mostly sure of it."""
+    """From .6 m/s up to 4.2 in 6 s and down in one or two, without end: it was 1.3 to 1.6, with pitch sure of it."""
     t = np.arange(0.0, 160.0, 0.01)
-    for smooth in (0.01, 1.0):
+    for smooth in (0.3, 1.0):
         many = max(1, round(smooth / 0.01))
         phase = np.arange(-2.0, 162.0, 0.01) % 7.0
         saw = np.where(phase < 6.0, 0.6 + 0.6 * phase, 4.2 - 3.6 * (phase - 6.0))

@@ -21,7 +21,7 @@ def table(n: int = N, *, slip: float = 0.1, length: float = 1.0, **columns: np.n
     base = Windows(
         recording=np.zeros(n, dtype=np.intp), start=length * np.arange(n), count=np.full(n, 50.0),
         torque_count=np.full(n, 50.0), drawbar_count=np.full(n, 50.0), acceleration_count=np.zeros(n),
-        ground_speed=speed, drawbar=np.full(n, 100.0), push=np.zeros(n), kinematic_push=np.zeros(n), push_within=np.zeros(n),
+        ground_speed=speed, drawbar=np.full(n, 100.0), push=np.zeros(n), kinematic_push=np.zeros(n),
         acceleration=none, pitch=none, yaw_rate=none, lateral=none, hub_speed=four.copy(),
         wheel_speed=four / RADIUS / (1 - slip), wheel_acceleration=0 * four, torque=10.0 * four, load=four * LOAD,
         position=length * np.arange(n)[:, None] - np.array([0.0, 0.0, 0.6, 0.6]), soil=np.full(n, "", dtype=object),

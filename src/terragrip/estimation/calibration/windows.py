@@ -32,8 +32,7 @@ class Windows:
     ``drawbar_count`` and ``acceleration_count`` (n,) of these channels; ``torque``,
     ``wheel_speed``, ``wheel_acceleration``, ``hub_speed``, ``load``, ``position`` (n, wheels), position being
     the metres of track that the wheel itself has come; ``push`` (n,) dv/dt + g sinθ, m/s², by the accelerometer where there is one,
-    ``kinematic_push`` by pitch and the ground speed of the windows around it, ``push_within`` by its slope in the window alone;
-    ``soil`` (n,) label.
+    ``kinematic_push`` by ground speed and pitch alone; ``soil`` (n,) label.
     """
 
     recording: Ints
@@ -46,7 +45,6 @@ class Windows:
     drawbar: Floats
     push: Floats
     kinematic_push: Floats
-    push_within: Floats
     acceleration: Floats
     pitch: Floats
     yaw_rate: Floats
@@ -124,8 +122,8 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     wheel_speed = np.where(rolls, hubs / vehicle.wheel_radius, per_wheel("wheel_speed"))
     pitch, measured = mean("pitch"), mean("acceleration_x")
     slope = np.nan_to_num(pitch)
-    climb = GRAVITY * np.sin(slope)
-    kinematic = _rate(speed, length) + climb
+    own = rate_within("ground_speed")
+    kinematic = np.where(np.isfinite(own), own, _rate(speed, length)) + GRAVITY * np.sin(slope)
     push = np.where(np.isfinite(measured), measured, kinematic)
     drawbar = mean("drawbar_force", 0.0)
     within = np.stack([rate_within(f"wheel_speed_{wheel}") for wheel in wheels], axis=1)
@@ -158,7 +156,6 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
         drawbar=drawbar,
         push=push,
         kinematic_push=kinematic,
-        push_within=rate_within("ground_speed") + climb,
         acceleration=measured,
         pitch=pitch,
         yaw_rate=yaw,
