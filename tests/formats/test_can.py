@@ -47,6 +47,11 @@ def dbc(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def cycles(stamps: list[float]) -> np.ndarray:
+    """The first of messages of a cycle of .1 s: those 5 ms apart at most."""
+    return np.array(stamps)[np.diff(stamps, prepend=-1.0) > 0.005]
+
+
 @pytest.mark.parametrize("suffix", ["blf", "asc", "trc", "log", "csv"])
 def test_every_container_gives_the_same_signals(tmp_path: Path, suffix: str) -> None:
     machine = drive(1000, 30.0)
@@ -55,7 +60,7 @@ def test_every_container_gives_the_same_signals(tmp_path: Path, suffix: str) -> 
     wheel = table.columns["WheelBasedMachineSpeed"]
     assert np.allclose(wheel[np.isfinite(wheel)], sent, atol=1e-9)
     assert np.isfinite(table.columns["GroundBasedMachineSpeed"]).sum() == 150
-    stamps = np.array([t for t, _, _ in machine.frames]) - START
+    stamps = cycles([t - START for t, _, _ in machine.frames])
     assert np.allclose(table.columns["time"], stamps, atol=2e-3)
     assert table.units["WheelBasedMachineSpeed"] == "m/s"
     assert table.start is None if suffix == "asc" else table.start == pytest.approx(START, abs=1e-3)
@@ -410,7 +415,7 @@ def test_forms_of_text_logs_by_their_content(tmp_path: Path, form: str) -> None:
     path = tmp_path / "log.txt"  # the name tells nothing
     path.write_text(text)
     recording = read(path, "tractor-isobus")
-    assert np.allclose(recording.time, [t for t, _, _ in frames], atol=1e-3)
+    assert np.allclose(recording.time, cycles([t for t, _, _ in frames]), atol=1e-3)
     assert np.isfinite(recording["ground_speed"]).sum() == 200
 
 
@@ -445,7 +450,7 @@ def test_bad_lines_are_left_out_and_the_first_is_named(tmp_path: Path, form: str
         lines.insert(place, bad)
     damaged.write_text("\n".join(lines) + "\n")
     table, expected = read_table(damaged), read_table(whole)
-    assert len(table.columns["time"]) == len(expected.columns["time"]) > 400
+    assert len(table.columns["time"]) == len(expected.columns["time"]) > 250
     for name, column in expected.columns.items():
         np.testing.assert_array_equal(table.columns[name], column)
     assert any(note.startswith("3 lines have no frame, the first is line 21 (") for note in table.notes)

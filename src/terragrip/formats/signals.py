@@ -16,7 +16,9 @@ from terragrip.recording.columns import SINCE_1970
 from terragrip.recording.schema import TIME
 
 SAME = 1e-3
-"""Share of the shortest typical spacing within which two stamps are one instant."""
+"""Share of the shortest typical spacing within which two stamps are one instant, whatever they are of."""
+_CYCLE = 0.05
+"""The same of stamps of different clocks: samples of one cycle, as of messages that a bus carries one after another."""
 _STEP = 1.0  # s by which a clock that was set goes back: samples that came late are no such step
 
 
@@ -96,7 +98,7 @@ class SignalLog:
             notes.append(f"{unset} samples were stamped before the logger's clock was set, and left out.")
         orders = {key: _order(t) for key, t in clocks.items()}
         ordered = [clocks[key][order] for key, order in orders.items()]
-        base, rows = union(ordered, _tolerance(ordered))
+        base, rows = _cycles(ordered)
         if not len(base):
             if self.signals:
                 raise InputError(
@@ -135,7 +137,7 @@ class SignalLog:
         """The union of the signals' instants [s] (n,), as they are stamped."""
         clocks = {id(s.time): s.time for s in self.signals.values()}
         ordered = [clock[_order(clock)] for clock in clocks.values()]
-        return union(ordered, _tolerance(ordered))[0]
+        return _cycles(ordered)[0]
 
     def _renamed(self) -> SignalLog:
         """The same log, in which a signal ``time`` is ``signal.time``: the table's own time takes that name."""
@@ -185,9 +187,11 @@ def _order(time: Floats) -> Ints | slice:
     return known[np.argsort(time[known], kind="stable")]
 
 
-def union(clocks: list[Floats], tolerance: float) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
+def union(
+    clocks: list[Floats], tolerance: float, cycle: float = 0.0
+) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
     """The instants (m,) of sorted clocks, and the row (n,) of each of their samples; stamps no more than ``tolerance`` [s] apart are
-    one instant. Frugal, since logs are long.
+    one instant, and those no more than ``cycle`` [s] apart where that joins no two of one clock. Frugal, since logs are long.
     """
     if not clocks:
         return np.empty(0), []
@@ -198,18 +202,24 @@ def union(clocks: list[Floats], tolerance: float) -> tuple[Floats, list[npt.NDAr
     stamps = stamps[order]
     apart = np.empty(len(stamps), dtype=bool)
     apart[0] = True
-    np.greater(stamps[1:] - stamps[:-1], tolerance, out=apart[1:])
-    row = np.empty(len(stamps), dtype=np.int32)
+    np.greater(stamps[1:] - stamps[:-1], max(tolerance, cycle), out=apart[1:])
+    row, ends = np.empty(len(stamps), dtype=np.int32), np.cumsum([len(clock) for clock in clocks])[:-1]
     row[order] = np.cumsum(apart, dtype=np.int32)
+    twice = [own[1:][own[1:] == own[:-1]] for own in np.split(row, ends)]
+    if cycle > tolerance and any(map(len, twice)):  # a burst of late samples
+        burst = np.isin(row[order], np.concatenate(twice))
+        apart[1:] |= burst[1:] & (stamps[1:] - stamps[:-1] > tolerance)
+        row[order] = np.cumsum(apart, dtype=np.int32)
     row -= 1
     del order
-    ends = np.cumsum([len(clock) for clock in clocks])[:-1]
     return stamps[apart], np.split(row, ends)
 
 
-def _tolerance(clocks: list[Floats]) -> float:
+def _cycles(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
+    """`union` of clocks, a cycle of messages as one instant."""
     spacings = [float(np.median(np.diff(clock))) for clock in clocks if len(clock) > 2]
-    return SAME * min((s for s in spacings if s > 0), default=0.0)
+    shortest = min((s for s in spacings if s > 0), default=0.0)
+    return union(clocks, SAME * shortest, _CYCLE * shortest)
 
 
 def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:
