@@ -157,6 +157,27 @@ def test_a_name_that_occurs_twice_is_in_the_way_of_that_column_alone(
         read(path, Profile.from_dict({"channels": {"ground_speed": "Speed"}}))
 
 
+@pytest.mark.parametrize(
+    "noted",
+    [
+        b"\x88",
+        b"{",
+        b"[1]",
+        b"null",
+        b'{"index_columns": 3}',
+        b'{"index_columns": [{}, 1, "x"]}',
+        b"[" * 100_000,
+    ],
+)
+def test_a_log_is_read_whatever_pandas_notes_of_its_index(
+    tmp_path: Path, log: pd.DataFrame, noted: bytes
+) -> None:
+    """A damaged byte of the metadata was a traceback (make fuzz)."""
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table({n: log[n] for n in log}).replace_schema_metadata({b"pandas": noted}), path)
+    assert len(read(path)) == len(log)
+
+
 def test_a_column_of_lists_is_refused(tmp_path: Path, log: pd.DataFrame) -> None:
     path = tmp_path / "log.parquet"
     table = pa.table({**{n: log[n] for n in log if n != "ground_speed"}, "ground_speed": [[1.0, 2.0]] * 300})

@@ -38,7 +38,7 @@ def parquet_on_disk(path: str) -> TableOnDisk:
         spelt = dict(zip(named, whole, strict=True))
         units = {name: unit for name in named if (unit := behind.get(name) or stated.get(spelt[name]))}
         unreadable = tuple(name for name, field in zip(named, fields, strict=True) if not _is_readable(field))
-        index = [n for n in (file.schema_arrow.pandas_metadata or {}).get("index_columns", ()) if n in whole]
+        index = [name for name in _index_columns(file.schema_arrow) if name in whole]
         if len(index) == 1 and TIME not in named and pa.types.is_temporal(fields[whole.index(index[0])].type):
             named = (TIME, *(name for name in named if not name.startswith("__index_level_")))
             spelt[TIME] = index[0]
@@ -59,6 +59,16 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     twice = tuple(name for name in names if named.count(name) > 1)
     is_long = os.path.getsize(path) >= _LONG
     return TableOnDisk(names, units, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
+
+
+def _index_columns(schema: pa.Schema) -> list[str]:
+    """The columns of a DataFrame's index, as pandas notes them in a file's metadata; none where these are damaged or another writer's."""
+    try:
+        noted = schema.pandas_metadata
+    except (ValueError, RecursionError):
+        return []
+    columns = noted.get("index_columns") if isinstance(noted, dict) else None
+    return [name for name in columns if isinstance(name, str)] if isinstance(columns, list) else []
 
 
 def _flat(table: pa.Table) -> pa.Table:
