@@ -77,7 +77,7 @@ def units_of_fields(schema: Any) -> dict[str, str]:
     try:
         pandas = json.loads((schema.metadata or {}).get(b"pandas", b"{}"))
         result = _texts(pandas["attributes"]["units"])
-    except (ValueError, KeyError, TypeError):  # damaged, or none stated
+    except (ValueError, KeyError, TypeError, RecursionError):  # damaged, or none stated
         result = {}
     units = {field.name.strip(): (field.metadata or {}).get(b"unit", b"") for field in schema}
     return result | {name: unit.decode("utf-8", "replace") for name, unit in units.items() if unit}
