@@ -68,6 +68,9 @@ def test_table_agrees_with_pint(symbol: str) -> None:
         ("1 lb-ft", "N m", 1.3558179483314),
         ("1 ft.lb", "N m", 1.3558179483314),
         ("1 kg m", "N m", 9.80665),
+        ("1 FT-LB", "N m", 1.3558179483314),
+        ("1 ftlb", "N m", 1.3558179483314),
+        ("1 G", "m/s^2", 9.80665),
         ("1 lbm", "kg", 0.45359237),
         *((f"1 {unit}", "N m", size) for unit, size in MOMENTS.items()),
         ("90 Grad", "rad", 1.57079632679),
@@ -102,6 +105,7 @@ def test_numbers_of_numpy_and_quantities_of_pint_are_numbers(value: object) -> N
         ("5 1/s", "rad/s", "ambiguous"),
         ("5 s^-1", "rad/s", "ambiguous"),
         ("5 grad", "rad", "ambiguous"),
+        ("5 tons", "kg", "ambiguous"),  # 907 kg each by pint, 1000 kg by most
         ("5 kg", "m", "measures a mass"),
         ("5 kg", "N m", "measures a mass"),
         ("1e400 m", "m", "not a finite number"),

@@ -32,7 +32,8 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "V": (1.0, (1, 2, -3, -1)),
     "N": (1.0, (1, 1, -2, 0)), "kN": (1e3, (1, 1, -2, 0)), "daN": (10.0, (1, 1, -2, 0)),
     "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "kp": (STANDARD_GRAVITY, (1, 1, -2, 0)),
-    "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)), "kip": (453.59237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "kips": (453.59237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
     "J": (1.0, (1, 2, -2, 0)),
     "W": (1.0, (1, 2, -3, 0)), "kW": (1e3, (1, 2, -3, 0)), "PS": (75 * STANDARD_GRAVITY, (1, 2, -3, 0)),
     "Pa": (1.0, (1, -1, -2, 0)), "kPa": (1e3, (1, -1, -2, 0)), "MPa": (1e6, (1, -1, -2, 0)),
@@ -49,6 +50,9 @@ _BASE: dict[str, tuple[float, Dimension]] = {
 }  # fmt: skip
 _MOMENT = re.compile(r"^(?!lbm$)([kmM]?N|daN|kgf?|kp|lbf?)(mm?|cm|ft|in)$")
 """A force, or a mass for its weight, and the length of its lever, written together: Nm, daNm, kgm, lbft. lbm is a pound of mass."""
+_LEVER_FIRST = re.compile(r"^(ft|in)(lb[fs]?)$")
+_TON = re.compile(r"\btons?\b", re.IGNORECASE)
+"""Of 1000 kg, 2000 lb or 2240 lb: pint would silently mean the second."""
 _SUPERSCRIPTS = str.maketrans(
     {"²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "·": "*", "⋅": "*", "×": "*", "μ": "µ"}
 )
@@ -127,12 +131,14 @@ def factor_to(text: str, si_unit: str) -> float:
     and 1/s are refused for an angular velocity, since they could mean rad/s or revolutions per second, and grad for an angle.
     """
     target = parse_unit(si_unit)
-    if text.strip() == "g" and target.dimension == _GRAVITY:
+    if text.strip() in ("g", "G") and target.dimension == _GRAVITY:
         return STANDARD_GRAVITY
     if "rad" in si_unit and may_be_turns(text):
         raise UnitError(f"{text.strip()!r} is ambiguous for an angular velocity", "write rad/s, deg/s or rpm")
     if text.strip().partition("/")[0] == "grad":
         raise UnitError(f"{text.strip()!r} is ambiguous", "write deg, or gon")
+    if _TON.search(text):
+        raise UnitError(f"{text.strip()!r} is ambiguous", "write t (1000 kg), kg or lb")
     unit = parse_unit(text)
     if target.kind in ("a force", "a torque") and unit.weighs(target):
         return unit.factor * STANDARD_GRAVITY / target.factor
@@ -177,7 +183,9 @@ def _plain(text: str) -> str:
     plain = text.translate(_SUPERSCRIPTS).replace("^-^", "^-").strip()
     if _TURNS_A_MINUTE.fullmatch(plain):
         return "rpm"
-    plain = _MOMENT.sub(r"\1*\2", re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "*", plain))
+    plain = _MOMENT.sub(
+        r"\1*\2", _LEVER_FIRST.sub(r"\1*\2", re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "*", plain))
+    )
     return plain if plain.startswith("g_") else _POWER.sub(r"^\1", plain)
 
 
@@ -203,7 +211,9 @@ def _from_table(text: str) -> Unit | None:
                 return None
             sign = -1 if match[3] == "/" else 1
         else:
-            spelt = match[4] == "Km" or (match[4] not in _BASE and len(match[4]) > 2)
+            spelt = match[4] in ("Km", "FT", "Ft", "LB", "Lb") or (
+                match[4] not in _BASE and len(match[4]) > 2
+            )
             name = match[4].lower() if spelt else match[4]
             if name not in _BASE:
                 return None

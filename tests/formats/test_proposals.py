@@ -20,6 +20,7 @@ from terragrip.formats import Profile, inspect, read
 from terragrip.formats.proposal import missing_channels, profile_text
 from terragrip.formats.recognition import propose
 from terragrip.formats.vocabulary import GENERAL
+from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_maker import make
 
@@ -536,6 +537,27 @@ def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newto
 )
 def test_names_of_others(name: str, channel: str | None) -> None:
     assert set(_propose({name: SPEED})) == ({channel} if channel else set())
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "unit", "si"),
+    [
+        ("radar_mph", "ground_speed", "m/s", 0.44704),  # was metres an hour, without a doubt
+        ("GPS_SPEED_MPH", "ground_speed", "m/s", 0.44704),
+        ("pull_lbf", "drawbar_force", "N", 4.4482216152605),
+        ("DRAWBAR_KLBF", "drawbar_force", "N", 4448.2216152605),
+        ("LR_torque_ftlb", "drive_torque_rl", "N m", 1.3558179483314),
+        ("torque_lr_lb_ft", "drive_torque_rl", "N m", 1.3558179483314),
+        ("TorqueLrFtLb", "drive_torque_rl", "N m", 1.3558179483314),
+        ("torque_lr_N_m", "drive_torque_rl", "N m", 1.0),
+        ("Accel_X (G)", "acceleration_x", "m/s^2", 9.80665),
+        ("Torque_LR [FT-LB]", "drive_torque_rl", "N m", 1.3558179483314),
+    ],
+)
+def test_units_of_american_loggers(name: str, channel: str, unit: str, si: float) -> None:
+    proposal = _propose({name: SPEED})[channel]
+    assert not proposal.is_doubtful
+    assert factor_to(str(proposal.entry.get("unit", unit)), unit) == pytest.approx(si)
 
 
 names = st.one_of(

@@ -112,7 +112,7 @@ def kind_of(unit: str | None) -> str | None:
     """What a unit measures: speed, rotation, torque, ...; None without a unit, "other" of one that no channel has."""
     if unit is None:
         return None
-    if unit.strip() in ("g", "mg"):
+    if unit.strip() in ("g", "G", "mg"):
         return "acceleration"
     if unit.strip() in ("%", "percent"):
         return "share"

@@ -91,10 +91,17 @@ UNIT_WORDS = {
     "millisecond": "ms", "microsecond": "us", "nanosecond": "ns",
     "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
     "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
-    "percent": "%", "pct": "%", "kg": "kg",
+    "percent": "%", "pct": "%", "kg": "kg", "lbs": "lbs", "lbf": "lbf", "klbf": "klbf", "kip": "kip", "kips": "kip",
+    **dict.fromkeys(("lbft", "ftlb", "ftlbs", "lbfft", "ftlbf"), "lbf ft"), **dict.fromkeys(("inlb", "inlbs", "lbin", "inlbf"), "lbf in"),
 }  # fmt: skip
 _ALWAYS = ("rpm", "rps", "kmh", "kph", "kmph", "mph", "mps")  # mean a unit wherever they stand
-_PER = re.compile(r"(km|m|mm|cm|mi|rad|deg|rev|ft)p(s|h|hr|min)(2?)$")
+_MOMENTS = {"n m": "N m", "kn m": "kN m"} | {
+    text: f"{force} {lever}"
+    for force in ("lb", "lbs", "lbf")
+    for lever in ("ft", "in")
+    for text in (f"{force} {lever}", f"{lever} {force}")
+}
+_PER = re.compile(r"(?!mph)(km|m|mm|cm|mi|rad|deg|rev|ft)p(s|h|hr|min)(2?)$")  # mph are miles
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _SYMBOL_OF_AXIS = re.compile(r"(acc|accel|accl|gyro|gyr|vel|omega|a|g|w|v|f)([xyz])$")
 _SYMBOLS = {
@@ -269,7 +276,7 @@ class Vocabulary:
         if bracket is None or not name[: bracket.start()].strip():
             return name, None
         text, plain = bracket[1], bracket[1].lower()
-        unit = text if is_common(text) or text == "g" else self.unit_word(plain)
+        unit = text if is_common(text) or text == "G" else self.unit_word(plain)
         is_word = unit is None and len(plain) > 2 and plain in self._known
         if is_word or not 0 < len(text) <= 10 or re.search(r"\s\w{3,}", text):
             return name, None
@@ -281,8 +288,16 @@ class Vocabulary:
             tail = words[-count:]
             if len(words) > count and tail[-1] in ("s", "h", "s2", "min", "2"):
                 top, bottom = tail[0], "".join(tail[1:])
-                if top in ("m", "km", "mm", "cm", "rad", "deg", "rev") and bottom in ("s", "h", "s2", "min"):
+                if top in ("m", "km", "mm", "cm", "mi", "ft", "rad", "deg", "rev") and bottom in (
+                    "s",
+                    "h",
+                    "s2",
+                    "min",
+                ):
                     return f"{top}/{bottom.replace('s2', 's^2')}", count
+        lever = _MOMENTS.get(" ".join(words[-2:]))
+        if lever is not None and any("torque" in self.concepts_of(word) for word in words[:-2]):
+            return lever, 2
         if (
             words
             and (unit := self.unit_word(words[-1])) is not None
