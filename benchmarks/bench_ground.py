@@ -222,7 +222,8 @@ def _targets(drives: Sequence[Drive]) -> str:
 
 def draw(drives: Sequence[Drive]) -> None:
     """The reliability diagram; bins of fewer than `DRAWN` blocks are left out."""
-    from terragrip.report.style import BLUE, GREEN, ORANGE, PURPLE, new_figure, on_paper, styled, to_svg
+    from terragrip.figures import BLUE, GREEN, ORANGE, PURPLE, new_figure, styled
+    from terragrip.report.style import on_paper, to_svg
 
     def panel(axes: Any, together: bool) -> None:
         axes.plot([0.3, 1], [0.3, 1], "--", color="0.6", linewidth=1)

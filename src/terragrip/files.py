@@ -141,6 +141,17 @@ def unwritable(path: str | os.PathLike[str], error: Exception, hint: str) -> Inp
     )
 
 
+def made_folder(path: str | os.PathLike[str]) -> Path:
+    """A folder, made with those above it where it is missing; raises InputError where it cannot be."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        problem = f"folder cannot be made ({error.strerror})"
+        raise InputError(problem, file=folder, hint="choose another folder") from error
+    return folder
+
+
 def path_of(path: object, otherwise: str = "give the path of a file") -> str:
     """A path as text; raises InputError, with ``otherwise`` as its hint, if it is none."""
     if isinstance(path, str | os.PathLike):

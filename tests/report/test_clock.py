@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
+from terragrip.figures import new_figure
 from terragrip.report.clock import Clock
-from terragrip.report.style import new_figure
 
 
 def axis(clock: Clock, low: float, high: float) -> tuple[str, list[str]]:

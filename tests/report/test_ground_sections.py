@@ -9,13 +9,14 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from terragrip.figures import PART_COLORS, SOIL_COLORS, soil_color
 from terragrip.ground.changes import Change
 from terragrip.ground.events import Event
 from terragrip.ground.result import Ground, Timeline
 from terragrip.ground.sections import Section as Stay
 from terragrip.report import ground_sections
 from terragrip.report.page import Page, Picture, Section, Table, render
-from terragrip.report.style import CSS_VARIABLES, PART_COLORS, SOIL_COLORS, soil_color, text_color
+from terragrip.report.style import CSS_VARIABLES, text_color
 
 NAMES = ("fine", "wet", "unknown")
 

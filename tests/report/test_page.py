@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from terragrip.errors import InputError
+from terragrip.figures import soil_color
 from terragrip.report import sections, wheels
 from terragrip.report.intervals import pooled, run_coverage
 from terragrip.report.page import Headline, Page, Picture, Section, Table, number, percent, render, write_page
 from terragrip.report.runs import Run
 from terragrip.report.scores import compare, truth_score
-from terragrip.report.style import CSS_VARIABLES, in_page, on_paper, soil_color
+from terragrip.report.style import CSS_VARIABLES, in_page, on_paper
 from terragrip.report.timeline import Lane, slots, timeline
 
 Drive = Callable[..., Run]

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from terragrip.figures import INK, MUTED, new_figure, soil_color, styled
 from terragrip.fleet.curves import FleetCurves
 from terragrip.fleet.dataset import soil_rows
 from terragrip.fleet.doubts import unlike
 from terragrip.fleet.tally import weighted
 from terragrip.report.curves import maxima
 from terragrip.report.page import Headline, Page, Picture, Section, Table, number, percent, render
-from terragrip.report.style import INK, MUTED, new_figure, soil_color, styled, to_svg
+from terragrip.report.style import to_svg
 
 Row = dict[str, Any]
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
+from terragrip.figures import BLUE, MUTED, ORANGE, new_figure, styled
 from terragrip.report.page import Picture, Section, Table, names, number, percent
-from terragrip.report.style import BLUE, MUTED, ORANGE, new_figure, styled, to_svg
+from terragrip.report.style import to_svg
 
 if TYPE_CHECKING:
     from terragrip.advice.result import Advice

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -182,7 +181,9 @@ def in_processes(
         for task in tasks:
             yield function(*task)
         return
-    with ProcessPoolExecutor(workers, initializer=_ignore_interrupts) as pool:
+    from terragrip.simulation.campaign import ignore_interrupts
+
+    with ProcessPoolExecutor(workers, initializer=ignore_interrupts) as pool:
         futures = [pool.submit(function, *task) for task in tasks]
         try:
             for future in as_completed(futures):
@@ -190,11 +191,6 @@ def in_processes(
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-
-
-def _ignore_interrupts() -> None:
-    """Ctrl-C reaches the whole process group: the parent ends the work, a worker finishes its file."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _report_progress(progress: Progress | None, done: int, total: int, what: str) -> None:

@@ -9,19 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.figures import BLUE, GREEN, INK, MUTED, ORANGE, new_figure, soil_color, styled
 from terragrip.physics.efficiency import tractive_efficiency
-from terragrip.report.style import (
-    BLUE,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    name_axis,
-    new_figure,
-    soil_color,
-    styled,
-    to_svg,
-)
+from terragrip.report.style import name_axis, to_svg
 from terragrip.soil.bins import BY_PULL
 
 if TYPE_CHECKING:

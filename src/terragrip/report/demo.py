@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from terragrip import __version__
-from terragrip.errors import InputError
+from terragrip.files import made_folder
 from terragrip.ground.result import write as write_ground
 from terragrip.report import (
     advice_sections,
@@ -89,12 +89,7 @@ def run_demo(
     """
     begin = time.monotonic()
     require_drawing()
-    folder = output / "estimates"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        problem = f"folder cannot be made ({error.strerror})"
-        raise InputError(problem, file=folder, hint="choose another folder") from error
+    folder = made_folder(output / "estimates")
     campaign = estimate_campaign(folder, seed, workers, progress, runs)
     campaign.vehicle.save(output / "vehicle.yaml")
     seconds = time.monotonic() - begin

@@ -51,7 +51,7 @@ def parts_of(run: Run) -> NDArray[np.object_] | None:
     passes = [(first, last) for name, first, last in label_stretches(what) if name == WORK]
     if passes:
         speeds = np.array([speed[a : b + 1].mean() for a, b in passes])
-        usual = _median(speeds, np.array([b - a + 1.0 for a, b in passes]))
+        usual = weighted_quantile(speeds, np.array([b - a + 1.0 for a, b in passes]), 0.5)
         for (first, last), mean in zip(passes, speeds, strict=True):
             if mean > FASTER * usual:
                 what[first : last + 1] = ROAD
@@ -76,7 +76,8 @@ def _motion(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return speed, np.abs(heading[behind] - heading[before]) / seconds
 
 
-def _median(values: Floats, weights: Floats) -> float:
+def weighted_quantile(values: Floats, weights: Floats, share: float) -> float:
+    """The value under which a share of the weights lies, both (n,)."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
-    return float(values[order][int(np.searchsorted(total, 0.5 * total[-1]))])
+    return float(values[order][int(np.searchsorted(total, share * total[-1]))])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,19 +57,11 @@ ALL = "the drive"
 class _Summary:
     """A line of the table of runs."""
 
-    name: str
-    duration: float
-    distance: float
+    driven: summary.Driven
     soils: tuple[str, ...]
     method: str
     events: str
-    began: datetime | None
     clock: Clock
-
-    @property
-    def driven(self) -> summary.Driven:
-        """As the summary on top takes it."""
-        return summary.Driven(self.name, self.duration, self.distance, self.began)
 
 
 _UNLABELLED = "no soil label, so no curve can be learned (a column soil)"
@@ -131,7 +123,7 @@ def report_of(
             hint="give estimates of a drive, not of a standstill",
         )
     main, together = shown[0], sorted(shown, key=lambda run: run.name)
-    clocks = {one.name: one.clock for one in summaries}
+    clocks = {one.driven.name: one.clock for one in summaries}
     comparisons: list[Comparison] = [c for run in together for c in compare(run)]
     page = Page(
         title,
@@ -187,7 +179,7 @@ def _read(paths: Sequence[Path], grounds: Sequence[Ground], step: Callable[[int]
         if run.wheels and run.moving.any():
             read.blocks.append(blocks_of(run, _labels(run)))
             soils = len(label_stretches(run.soil)) if run.has_adhesion else -1
-            worth = (soils, run.sensor_wheel is not None, read.summaries[-1].duration)
+            worth = (soils, run.sensor_wheel is not None, read.summaries[-1].driven.duration)
             kept = sorted([*kept, (worth, run)], key=lambda one: one[0], reverse=True)[:SHOWN]
         read.missing += [one for one in _lacks(run) if one not in read.missing]
         step(number_)
@@ -201,10 +193,7 @@ def _run(estimates: Estimates, name: str, grounds: Sequence[Ground], own: Sequen
     """A run with its events: those of its ground, without one those of the estimates themselves."""
     mine = [ground for ground in grounds if ground.run == name]
     happened = tuple(event for ground in mine for event in ground.events) if mine else tuple(own)
-    table = estimates.to_pandas()
-    table.attrs["zero_slip"] = estimates.about.get("zero_slip")
-    table.attrs["recording"] = estimates.about.get("recording")
-    return Run(name, table, estimates.method, vehicle=estimates.vehicle, events=happened)
+    return Run(name, estimates.to_pandas(), estimates.method, vehicle=estimates.vehicle, events=happened)
 
 
 def _labels(run: Run) -> NDArray[np.object_]:
@@ -288,29 +277,26 @@ def _summary(run: Run) -> _Summary:
     distance = run.estimated("distance")[-1] if "distance" in run.estimates else np.nan
     events = run.estimates["event"].value_counts() if "event" in run.estimates else {}
     shares = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
-    return _Summary(
-        run.name,
-        float(run.time[-1] - run.time[0]),
-        float(np.nan_to_num(distance)),
-        run.soils,
-        run.method,
-        shares or "–",
-        run.began + timedelta(seconds=float(run.time[0])) if run.began is not None else None,
-        run.clock,
-    )
+    began = run.began + timedelta(seconds=float(run.time[0])) if run.began is not None else None
+    seconds, metres = float(run.time[-1] - run.time[0]), float(np.nan_to_num(distance))
+    driven = summary.Driven(run.name, seconds, metres, began)
+    return _Summary(driven, run.soils, run.method, shares or "–", run.clock)
 
 
 def _runs(summaries: Sequence[_Summary]) -> Section:
-    clocked = any(one.began is not None for one in summaries)
+    clocked = any(one.driven.began is not None for one in summaries)
     table = Table(
         "The runs of this report. Events: the share of rows with each.",
         ("run", *(["began"] * clocked), "duration [s]", "distance [m]", "soils", "method", "events"),
         tuple(
             (
-                one.name,
-                *([f"{one.began:%Y-%m-%d %H:%M:%S}" if one.began is not None else "–"] * clocked),
-                number(one.duration, 0),
-                number(one.distance, 0),
+                one.driven.name,
+                *(
+                    [f"{one.driven.began:%Y-%m-%d %H:%M:%S}" if one.driven.began is not None else "–"]
+                    * clocked
+                ),
+                number(one.driven.duration, 0),
+                number(one.driven.distance, 0),
                 names(one.soils) or "unlabelled",
                 one.method,
                 one.events,

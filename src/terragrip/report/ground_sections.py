@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terragrip.figures import new_figure, styled
 from terragrip.ground.views import draw_soils
 from terragrip.report.clock import Clock
 from terragrip.report.operating_points import Cross, draw_crosses
-from terragrip.report.page import Picture, Section, Table, names, number, percent
+from terragrip.report.page import Picture, Section, Table, names, number, percent, stem
 from terragrip.report.runs import label_stretches
-from terragrip.report.style import new_figure, styled, to_svg
+from terragrip.report.style import to_svg
 from terragrip.report.timeline import soil_strip
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def recognised(
         labelled = any(ground.timeline.label)
         strip = " The strip on top is the recording's own label, grey a transition." if labelled else ""
         picture = Picture(
-            f"ground-{_stem(ground.run)}",
+            f"ground-{stem(ground.run)}",
             draw_probabilities(ground, clocks.get(ground.run, Clock())),
             f"{sim} {ground.run}: probability of each soil over time, {way}. Vertical lines: changes of the ground in the estimates, "
             f"as dark as they are probable, dotted where a tool may be the cause, with their standard deviations.{strip} Where two soils "
@@ -275,7 +276,3 @@ def _sensor(measured: object) -> str:
         if mean is not None:
             return f"{number(mean)} ± {number(std)}"
     return "–"
-
-
-def _stem(name: str) -> str:
-    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from terragrip.arrays import Floats
 from terragrip.estimation.consistency import coverage, nis_consistency
+from terragrip.figures import BLUE, GREEN, INK, ORANGE, new_figure, styled
 from terragrip.report.page import Table, number, percent
 from terragrip.report.runs import Run
-from terragrip.report.style import BLUE, GREEN, INK, ORANGE, new_figure, styled, to_svg
+from terragrip.report.style import to_svg
 
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 

@@ -8,8 +8,9 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from terragrip.errors import InputError
+from terragrip.figures import styled
 from terragrip.report.page import Picture, Section, Table, number
-from terragrip.report.style import styled, to_svg
+from terragrip.report.style import to_svg
 
 if TYPE_CHECKING:
     from terragrip.estimation import Estimates

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.figures import INK, new_figure, soil_color, styled
 from terragrip.report.page import Table, number, percent
 from terragrip.report.runs import Run, label_stretches
-from terragrip.report.style import INK, name_axis, new_figure, soil_color, styled, to_svg
+from terragrip.report.style import name_axis, to_svg
 from terragrip.soil.literature import paper_soils
 
 LEAST_ROWS = 100

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from terragrip.errors import InputError, missing_package
-from terragrip.files import replacing
+from terragrip.errors import missing_package
+from terragrip.files import made_folder, replacing
 from terragrip.report.style import in_page, on_paper
 
 
@@ -122,12 +122,7 @@ def write_whole(path: Path, text: str) -> None:
 
     Raises InputError when the place cannot be written (a read-only folder, a full disk).
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"folder cannot be made ({error.strerror})", file=path.parent, hint="choose another folder"
-        ) from error
+    made_folder(path.parent)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -147,6 +142,11 @@ def percent(share: float | None, digits: int = 1) -> str:
 def names(words: Sequence[str]) -> str:
     """Words in a row: "a, b and c"."""
     return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if words else ""
+
+
+def stem(name: str) -> str:
+    """A soil's or a run's name as a part of a file's name and of an id."""
+    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)
 
 
 def require_drawing() -> None:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.arrays import Floats
+from terragrip.figures import INK, MUTED, new_figure, soil_color, styled
 from terragrip.physics.geodesy import metres_of
 from terragrip.report.field_work import PARTS
 from terragrip.report.page import Picture, Section, names
 from terragrip.report.runs import Run
-from terragrip.report.style import INK, MUTED, new_figure, soil_color, styled, to_svg
+from terragrip.report.style import to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,10 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.consistency import Whiteness, whiteness
+from terragrip.figures import INK, new_figure, styled
 from terragrip.report.page import Picture, Section, Table, number
 from terragrip.report.runs import Run
-from terragrip.report.style import INK, MEASURED, TRUE, new_figure, styled, to_svg
+from terragrip.report.style import MEASURED, TRUE, to_svg
 
 STEP = 0.1
 """Seconds between the rows that whiteness is judged on: the estimates of neighbouring rows share their samples."""

@@ -8,10 +8,12 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.estimation.rims import DRIVE, calibrated_scale
-from terragrip.physics.geodesy import metres_of
+from terragrip.figures import INK, new_figure, styled
+from terragrip.report.field_work import weighted_quantile
 from terragrip.report.page import Picture, Section, Table, names, number
+from terragrip.report.path import positions
 from terragrip.report.runs import Run
-from terragrip.report.style import ESTIMATED, INK, name_axis, new_figure, styled, to_svg
+from terragrip.report.style import ESTIMATED, name_axis, to_svg
 from terragrip.report.timeline import Lane, timeline
 
 _POINTS = 2000
@@ -94,7 +96,7 @@ def histogram(run: Run) -> Section:
         name_axis(plot.xaxis, f"slip s, {wheel} [%]")
         plot.set_ylabel("share of the distance [%]")
         drawn = to_svg(figure)
-    median, ninety = _weighted(slip, way, 0.5), _weighted(slip, way, 0.9)
+    median, ninety = weighted_quantile(slip, way, 0.5), weighted_quantile(slip, way, 0.9)
     picture = Picture(
         f"slip-histogram-{run.name}",
         drawn,
@@ -123,28 +125,21 @@ def histogram(run: Run) -> Section:
 def place(run: Run) -> Section:
     """Slip where it was driven, on a plane by metres east and north."""
     title = f"Slip by place in {run.name}"
-    if not {"latitude", "longitude"} <= set(run.estimates.columns):
+    at = positions(run)
+    if at is None:
         return Section(
             f"slip-map-{run.name}",
             title,
-            omitted="Left out: the log has no position (latitude and longitude).",
+            omitted="Left out: the log has no positions (latitude and longitude).",
         )
-    latitude, longitude = run.estimated("latitude"), run.estimated("longitude")
-    north, east = metres_of(latitude, longitude)
     slip, std = run.estimated(f"slip_{run.shown_wheel}"), run.estimated(f"slip_{run.shown_wheel}_std")
-    fixed = np.isfinite(north) & np.isfinite(east)
-    if fixed.sum() < 2:
-        return Section(
-            f"slip-map-{run.name}", title, omitted="Left out: the log has fewer than two positions."
-        )
-    instants, rows = run.time[fixed], np.flatnonzero(np.isfinite(slip) & (std < _UNSURE))
+    rows = np.flatnonzero(np.isfinite(slip) & (std < _UNSURE))
     rows = rows[:: max(1, len(rows) // _POINTS)]
     if not len(rows):
         return Section(
             f"slip-map-{run.name}", title, omitted="Left out: slip is not known on any stretch of the drive."
         )
-    y = np.interp(run.time[rows], instants, north[fixed] - np.median(north[fixed]))
-    x = np.interp(run.time[rows], instants, east[fixed] - np.median(east[fixed]))
+    x, y = (values[rows] for values in at)
     figure = new_figure(height=5.0)
     with styled():
         from matplotlib import colormaps
@@ -168,8 +163,8 @@ def place(run: Run) -> Section:
     picture = Picture(
         f"slip-map-{run.name}",
         drawn,
-        f"Run {run.name}: slip where it was driven, metres from {np.median(latitude[fixed]):.5f}°, "
-        f"{np.median(longitude[fixed]):.5f}°. Rows whose slip is known to worse than {_UNSURE:g} are left out.",
+        f"Run {run.name}: slip where it was driven, in metres from the first position. Rows whose slip is known to worse than "
+        f"{_UNSURE:g} are left out.",
         f"Map of slip in {run.name}",
     )
     return Section(f"slip-map-{run.name}", title, (), (picture,))
@@ -181,13 +176,6 @@ def _rows(run: Run, wheel: str) -> tuple[Floats, Floats]:
     way = np.diff(run.estimated("distance"), prepend=run.estimated("distance")[0])
     rows = np.isfinite(slip) & (std < _UNSURE) & np.isfinite(way)
     return slip[rows], way[rows]
-
-
-def _weighted(values: Floats, weights: Floats, share: float) -> float:
-    """The value under which a share of the weights lies."""
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][int(np.searchsorted(total, share * total[-1]))])
 
 
 def _lane(run: Run, column: str, label: str) -> Lane:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from terragrip.physics.adhesion import CURVES
 from terragrip.report.curves import SoilCurves, draw_all_maxima, draw_both_maxima, draw_fits, maxima
-from terragrip.report.page import Picture, Section, Table, names, number, percent
+from terragrip.report.page import Picture, Section, Table, names, number, percent, stem
 from terragrip.soil.bins import BY_PULL, BY_SLIP, BinSettings
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.soil.learn import Campaign
@@ -55,7 +55,7 @@ def both_maxima(
     truth = ", dashed: the simulated truth" if first.truth is not None else ""
     pictures: list[Picture | Table] = [
         Picture(
-            f"maxima-{_stem(first.name)}",
+            f"maxima-{stem(first.name)}",
             draw_both_maxima(first, tire_resistance),
             f"Adhesion µ(s) and tractive efficiency η(s) on {first.name} by the fitted curve{truth}. Most pull and best efficiency "
             "lie at different slips: the curve shows the cost of each." + HINT * (not first.sure),
@@ -103,7 +103,7 @@ def fits(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str]) -> Section
     how = _preparation(curves) + HINT * (not all(one.sure for one in curves))
     content: list[Picture | Table] = [
         Picture(
-            f"fit-{_stem(first.name)}",
+            f"fit-{stem(first.name)}",
             draw_fits([first], 1),
             f"Adhesion over slip on {first.name}: {text}. {how}",
             f"Bins and fitted curve on {first.name}",
@@ -294,8 +294,3 @@ def _scale(soil: Soil | None) -> str:
 
 def _interval(pair: tuple[float, float] | None) -> str:
     return "–" if pair is None else f"{number(pair[0])} to {number(pair[1])}"
-
-
-def _stem(name: str) -> str:
-    """A soil's name as a part of a file name and an id."""
-    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)

@@ -15,39 +15,16 @@ from terragrip.figures import (
     MUTED,
     ORANGE,
     PAPER,
-    PART_COLORS,
     PURPLE,
     SKY,
-    SOIL_COLORS,
     VERMILLION,
     YELLOW,
-    new_figure,
-    soil_color,
     styled,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
-
-__all__ = [
-    "BLUE",
-    "GREEN",
-    "GRID",
-    "INK",
-    "MUTED",
-    "ORANGE",
-    "PAPER",
-    "PART_COLORS",
-    "PURPLE",
-    "SKY",
-    "SOIL_COLORS",
-    "VERMILLION",
-    "YELLOW",
-    "new_figure",
-    "soil_color",
-    "styled",
-]
 
 _DARK, _LIGHT = "#000000", "#fdfdfd"
 """Text on a patch whose colour is the same in either scheme."""

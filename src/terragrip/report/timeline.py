@@ -10,20 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terragrip.arrays import Bools, Floats
+from terragrip.figures import INK, MUTED, new_figure, soil_color, styled
 from terragrip.report.runs import Run, label_stretches, stretches
-from terragrip.report.style import (
-    ESTIMATED,
-    INK,
-    MEASURED,
-    MUTED,
-    TRUE,
-    name_axis,
-    new_figure,
-    soil_color,
-    styled,
-    text_color,
-    to_svg,
-)
+from terragrip.report.style import ESTIMATED, MEASURED, TRUE, name_axis, text_color, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

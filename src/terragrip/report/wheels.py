@@ -5,21 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from terragrip.arrays import Floats
+from terragrip.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure, styled
 from terragrip.recording.window_means import window_means
 from terragrip.report.page import Picture, Section, Table, number
 from terragrip.report.runs import Run
-from terragrip.report.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    name_axis,
-    new_figure,
-    styled,
-    to_svg,
-)
+from terragrip.report.style import name_axis, to_svg
 
 _COLORS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, SKY)
 _DASHES = ("-", "--", "-.", ":")

@@ -7,10 +7,11 @@ from datetime import timedelta
 
 import numpy as np
 
+from terragrip.figures import GRID, INK, new_figure, styled
 from terragrip.report.blocks import BAND_NAMES, Blocks, Share, share_of, shares
 from terragrip.report.field_work import PARTS, STANDING
 from terragrip.report.page import Picture, Section, Table, number, percent
-from terragrip.report.style import GRID, INK, new_figure, styled, text_color, to_svg
+from terragrip.report.style import text_color, to_svg
 
 HOUR, QUARTER = 3600.0, 900.0
 LONG = 2.5 * HOUR

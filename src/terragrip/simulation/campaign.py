@@ -55,7 +55,7 @@ def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Generator[Simu
     if workers <= 1:
         yield from map(_one, jobs)
         return
-    pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(workers, initializer=ignore_interrupts)
     try:
         # A few runs ahead of the reader, no more: results are large.
         ahead = [pool.submit(_one, job) for job in jobs[: 2 * workers]]
@@ -67,7 +67,7 @@ def _each(jobs: list[tuple[Scenario, int, int]], workers: int) -> Generator[Simu
         pool.shutdown(cancel_futures=True)
 
 
-def _ignore_interrupts() -> None:
+def ignore_interrupts() -> None:
     """Ctrl-C reaches the workers too: one that it stops while it holds a queue would hang the others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,15 +45,9 @@ class SimulationResult:
         """Write recording.parquet, truth.parquet, vehicle.yaml and true_parameters.json; raises InputError if it cannot."""
         import json
 
-        from terragrip.files import replacing
+        from terragrip.files import made_folder, replacing
 
-        target = Path(folder)
-        try:
-            target.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"cannot be made ({error.strerror})", file=target, hint="choose another folder"
-            ) from error
+        target = made_folder(folder)
         with replacing(target / "recording.parquet") as temporary:
             self.recording.to_pandas().to_parquet(temporary, index=False)
         with replacing(target / "truth.parquet") as temporary:
