@@ -560,6 +560,76 @@ def test_units_of_american_loggers(name: str, channel: str, unit: str, si: float
     assert factor_to(str(proposal.entry.get("unit", unit)), unit) == pytest.approx(si)
 
 
+@pytest.mark.parametrize("name", ["enc_count_{}", "ticks_{}", "{}_encoder", "wheel_{}_pulses"])
+def test_counts_of_encoders_are_proposed_with_the_scale_that_is_missing(tmp_path: Path, name: str) -> None:
+    """'has no wheel speed: log the wheels too' was all that a robot with encoders got."""
+    counts = np.floor(1024 / (2 * np.pi) * WAY / 0.7)
+    columns = {"time": TIME, "ground_speed": SPEED}
+    columns |= {name.format(side): counts for side in ("left", "right")}
+    columns |= {"error_count_left": np.floor(TIME), "encoder_temp_left": np.round(20 + TIME)}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    inspection = inspect(tmp_path / "log.csv", vehicle=_tractor(tmp_path))
+    assert set(inspection.recognised) == {"ground_speed", "wheel_speed_rl", "wheel_speed_rr"}
+    proposal = inspection.proposals["wheel_speed_rl"]
+    assert proposal.columns == (name.format("left"),)
+    assert "2 pi over the counts in a turn of the wheel (some 102" in proposal.give
+    (tmp_path / "p.yaml").write_text(inspection.profile.replace("scale: 1.0", f"scale: {2 * np.pi / 1024}"))
+    speed = read(tmp_path / "log.csv", tmp_path / "p.yaml")["wheel_speed_rl"]
+    assert np.nanmedian(np.abs(speed * 0.7 / SPEED - 1)) < 0.01
+
+
+def test_counts_in_each_row_are_not_taken_for_counts_that_go_on() -> None:
+    counts = np.floor(1024 / (2 * np.pi) * WAY / 0.2)
+    for beside in ({"ground_speed": SPEED}, {}):
+        steps = {f"ticks_{side}": np.diff(counts, prepend=0.0) for side in ("left", "right")}
+        assert set(_propose({**steps, **beside})) == set(beside)
+
+
+def test_angles_of_joints_become_wheel_speeds_where_a_driver_gives_no_velocity() -> None:
+    joints = {f"/joint_states.position.{side}_wheel_joint": WAY / 0.2 for side in ("left", "right")}
+    steered = {"/joint_states.position.front_left_steering_joint": WAY / 0.2}
+    result = _propose({**joints, **steered, "ground_speed": SPEED})
+    assert set(result) == {"wheel_speed_l", "wheel_speed_r", "ground_speed"}
+    name = "/joint_states.position.left_wheel_joint"
+    assert result["wheel_speed_l"].entry == {"derivative_of": name, "unit": "rad"}
+    assert not result["wheel_speed_l"].is_doubtful
+    velocities = {name.replace("position", "velocity"): SPEED / 0.2 for name in joints}
+    assert _propose({**joints, **velocities})["wheel_speed_l"].entry == {
+        "from": "/joint_states.velocity.left_wheel_joint"
+    }
+
+
+def _tractor(folder: Path) -> Vehicle:
+    (folder / "tractor.yaml").write_text(
+        "mass: 5 t\nwheelbase: 2.5 m\ncenter_of_gravity_height: 0.9 m\naxles:\n"
+        "  front: {mass: 2 t, wheels: [fl, fr], wheel: {radius: 0.4 m, inertia: 20 kg m^2}, driven: false}\n"
+        "  rear: {mass: 3 t, wheels: [rl, rr], wheel: {radius: 0.7 m, inertia: 90 kg m^2}}\n"
+    )
+    return Vehicle.load(folder / "tractor.yaml")
+
+
+def test_left_and_right_of_a_vehicle_with_one_driven_axle_are_its_wheels(tmp_path: Path) -> None:
+    """'but the vehicle's wheels are fl, fr, rl, rr', of a tractor's torque hubs."""
+    columns = {"t": TIME, "ground_speed": SPEED}
+    for side in ("left", "right"):
+        columns |= {f"{side}_rpm": SPEED / 0.7 * 30 / np.pi, f"{side}_torque_kNm": 5 + np.sin(TIME)}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    result = inspect(tmp_path / "log.csv", vehicle=_tractor(tmp_path)).proposals
+    wheels = ("wheel_speed_rl", "wheel_speed_rr", "drive_torque_rl", "drive_torque_rr", "ground_speed")
+    assert {n: p.is_doubtful for n, p in result.items()} == dict.fromkeys(wheels, False)
+
+
+def test_a_wheel_has_one_name_in_a_proposal(tmp_path: Path) -> None:
+    """wheel_speed_left and drive_torque_l: two wheels, of which neither could be estimated; and no profile was shown."""
+    columns = {"time": TIME, "ground_speed": SPEED}
+    for side in ("left", "right"):
+        columns |= {f"wheel_speed_{side}": SPEED / 0.7, f"torque_{side}": 5 + np.sin(TIME)}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    inspection = inspect(tmp_path / "log.csv")
+    assert {"wheel_speed_left", "drive_torque_left"} <= inspection.recognised.keys()
+    assert "drive_torque_left: {from: torque_left}" in inspection.to_text()
+
+
 names = st.one_of(
     st.text(max_size=12), st.builds("_".join, st.lists(st.sampled_from((*WORDS, *UNITS)), max_size=4))
 )

@@ -1,5 +1,5 @@
-"""What a log may hold only indirectly: a ground speed of two velocities or positions, a pitch of a quaternion, proposed where no column
-is it."""
+"""What a log may hold only indirectly: a ground speed of two velocities or positions, a pitch of a quaternion, wheel speeds of encoders'
+counts, proposed where no column is it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,20 @@ import numpy as np
 from terragrip.arrays import Floats
 from terragrip.formats.candidates import Column
 from terragrip.formats.channel_proposal import Proposal
-from terragrip.formats.evidence import Evidence
+from terragrip.formats.evidence import RADII, Evidence
 from terragrip.formats.judgement import varies
+from terragrip.formats.rim_units import lightest_share, radius_of
+from terragrip.formats.vocabulary import GENERAL
+from terragrip.recording.schema import rim_names
+from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
+
+_COUNT = frozenset(
+    ["tick", "ticks", "count", "counts", "cnt", "counter", "pulse", "pulses", "encoder", "encoders", "enc"]
+)
+_ONE_WAY = 0.7
+"""Least share of a count's steps in one direction, where no ground speed shows that it counts on."""
+_NO_COUNT = ("command", "other", "statistic", "rate", "speed", "ground", "acceleration")
 
 
 def add_indirect(
@@ -20,8 +32,10 @@ def add_indirect(
     numbers: Mapping[str, Floats],
     columns: Mapping[str, Column],
     plane: tuple[str, str] | tuple[()],
+    evidence: Evidence,
+    vehicle: Vehicle | None,
 ) -> None:
-    """Ground speed from two velocities or positions, pitch from a quaternion, where no column is it."""
+    """Ground speed from two velocities or positions, pitch from a quaternion, wheel speeds from counts, where no column is it."""
     pose = _quaternion(tuple(numbers))
     speed = _derived_speed(proposals, numbers, columns, plane, pose)
     if "ground_speed" not in proposals and speed is not None:
@@ -31,6 +45,64 @@ def add_indirect(
         proposals["pitch"] = Proposal(
             {"pitch_of": pose}, "axes forward, left, up?", "", 0.5, ("a quaternion",)
         )
+    if not rim_names(proposals):
+        proposals |= _of_counts(proposals, columns, evidence, vehicle)
+
+
+def _of_counts(
+    proposals: Mapping[str, Proposal],
+    columns: Mapping[str, Column],
+    evidence: Evidence,
+    vehicle: Vehicle | None,
+) -> dict[str, Proposal]:
+    """Wheel speeds of what counts their turning or is their angle, by name, and goes with the ground speed where there is one."""
+    result: dict[str, Proposal] = {}
+    ground = proposals.get("ground_speed")
+    for name, column in columns.items():
+        read = column.name
+        counts = bool(_COUNT.intersection(read.words))
+        others = frozenset().union(*(GENERAL.concepts_of(w) for w in read.words if w not in _COUNT))
+        angle = read.has("position") and read.has("wheel") and column.kind in (None, "angle")
+        turning = evidence.derivative(name)
+        if not read.wheel or not (counts or angle) or not others.isdisjoint(_NO_COUNT) or turning is None:
+            continue
+        time, rate = turning[0], np.abs(turning[1])
+        if counts and not evidence.is_whole(name) and column.unit is None:
+            continue
+        metres = None  # on the ground for each count
+        if ground is not None and "from" in ground.entry:
+            speed = np.abs(evidence.at(ground.columns[0], time)) * factor_to(ground.unit or "m/s", "m/s")
+            known = np.isfinite(speed)
+            metres = lightest_share(speed[known], rate[known])
+            if metres is None:
+                continue
+        elif abs(turning[1].sum()) < _ONE_WAY * rate.sum():  # counted in each row, not on
+            continue
+        result.setdefault(f"wheel_speed_{read.wheel}", _of_count(name, column, counts, metres, vehicle))
+    return result
+
+
+def _of_count(
+    name: str, column: Column, counts: bool, metres: float | None, vehicle: Vehicle | None
+) -> Proposal:
+    """The speed of a wheel from its count or angle, of which one is ``metres`` on the ground (None: unknown)."""
+    radius = radius_of(vehicle, column.name.wheel)
+    seen = () if metres is None else (f"{metres:.3g} m on the ground for each",)
+    if not counts or column.kind == "angle":
+        unit = column.unit or "rad"
+        size = None if metres is None else metres / factor_to(unit, "rad")
+        doubt = (
+            "" if size is not None and RADII[0] < size < RADII[1] else "the angle by which the wheel turned?"
+        )
+        entry: dict[str, object] = {"derivative_of": name, "unit": unit}
+        return Proposal(entry, doubt, "", 0.6, ("the angle of a wheel", *seen), (), unit)
+    turn = ""
+    if metres is not None and radius is not None:
+        some = float(f"{2 * np.pi * radius / metres:.3g}")
+        turn = f" (some {some:.0f} by the radius of {radius:.3g} m, less as it slips)"
+    give = f"the scale is 2 pi over the counts in a turn of the wheel{turn}"
+    entry = {"derivative_of": name, "scale": 1.0, "unit": "rad"}
+    return Proposal(entry, "", give, 0.6, ("a count of a wheel's turning", *seen))
 
 
 def _derived_speed(

@@ -39,8 +39,12 @@ def text_of(inspection: Inspection) -> str:
         parts.append(f"The log cannot be estimated as it is: {inspection.unfit}.")
     elif inspection.ready:
         parts.append("The log can be estimated as it is read here.")
-    else:
-        parts.append("Proposed profile (save it, check it, pass it with --profile)\n\n" + inspection.profile)
+    as_read = all(columns == (channel,) for channel, columns in inspection.recognised.items())
+    if not inspection.ready or not as_read:
+        more = ", which reads more of it" * (inspection.ready and not inspection.unfit)
+        parts.append(
+            f"Proposed profile{more} (save it, check it, pass it with --profile)\n\n{inspection.profile}"
+        )
     return "\n\n".join(parts).rstrip() + "\n"
 
 

@@ -5,7 +5,7 @@ A proposal without a question mark can be defended: its unit is stated, or the d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from terragrip.formats.evidence import Evidence
 from terragrip.formats.indirect import add_indirect, velocity_in_the_plane
 from terragrip.formats.judgement import Guess, Judge, varies
 from terragrip.formats.machines import machines_among, namespace_of, without
-from terragrip.formats.rim_units import own_name
+from terragrip.formats.rim_units import own_name, place_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.checks import PLACES
 from terragrip.recording.schema import LABELS, rim_names, split_channel
@@ -118,12 +118,15 @@ def _proposed(
     proposals = {
         channel: proposal_of(channel, guess, ranked[channel], vehicle) for channel, guess in chosen.items()
     }
-    add_indirect(proposals, numbers, columns, plane)
+    add_indirect(proposals, numbers, columns, plane, evidence, vehicle)
     for name in texts:
         read = vocabulary.read(name)  # of texts the ground is a label: a speed over it is none
         if name in LABELS or read.has("soil") or not _GROUNDS.isdisjoint(read.words):
             proposals.setdefault("soil", Proposal({"from": name}, confidence=0.8, evidence=("its name",)))
-    named = {_in_the_vehicle(c, vehicle): proposal for c, proposal in proposals.items()}
+    named: dict[str, Proposal] = {}
+    for channel, proposal in proposals.items():
+        own = _in_the_log(channel, proposals) if vehicle is None else _in_the_vehicle(channel, vehicle)
+        named[channel if own in proposals else own] = proposal  # left, where rear left is in the log, too
     result = Proposals({channel: _held_against(vehicle, channel, p) for channel, p in named.items()})
     used = {column for proposal in result.values() for column in proposal.columns}
     unused = [column for name, column in columns.items() if name not in used]
@@ -150,6 +153,14 @@ def _in_the_vehicle(channel: str, vehicle: Vehicle | None) -> str:
     """A wheel's channel by the name that the vehicle has for the wheel."""
     quantity, wheel = split_channel(channel) or ("", "")
     return f"{quantity}_{own_name(vehicle, wheel)}" if wheel else channel
+
+
+def _in_the_log(channel: str, channels: Iterable[str]) -> str:
+    """A wheel's channel by the name that the log's own columns have for the wheel: left, beside a column wheel_speed_left."""
+    quantity, wheel = split_channel(channel) or ("", "")
+    wheels = {parts[1] for one in channels if (parts := split_channel(one)) and parts[0] in _OF_WHEELS}
+    others = [one for one in wheels - {wheel} if quantity in _OF_WHEELS and place_of(one) == wheel]
+    return f"{quantity}_{others[0]}" if len(others) == 1 else channel
 
 
 def _held_against(vehicle: Vehicle | None, channel: str, proposal: Proposal) -> Proposal:

@@ -85,12 +85,24 @@ class RimUnit:
 
 
 def own_name(vehicle: Vehicle | None, wheel: str) -> str:
-    """The name that a vehicle has for a wheel of a corner or side in a log (vl for fl, 1l for l); the log's where it has none such."""
+    """The name that a vehicle has for a wheel of a corner or side in a log (vl for fl, 1l for l); the log's where it has none such.
+
+    A side alone is the driven wheel there, where one axle is driven: left of a tractor with free front wheels is its rear left one.
+    """
     if vehicle is None or wheel in vehicle.wheels:
         return wheel
-    read = {one: GENERAL.read(f"wheel_speed_{one}").wheel for one in vehicle.wheels}
-    meant = [one for one, place in read.items() if wheel in (place, place.lstrip("0123456789"))]
+    place = place_of(wheel) or wheel
+    read = {one: place_of(one) for one in vehicle.wheels}
+    meant = [one for one, own in read.items() if place in (own, own.lstrip("0123456789"))]
+    if place in ("l", "r") and not meant:
+        driven = dict(zip(vehicle.wheels, vehicle.driven, strict=True))
+        meant = [one for one, own in read.items() if driven[one] and own.endswith(place)]
     return meant[0] if len(meant) == 1 else wheel
+
+
+def place_of(wheel: str) -> str:
+    """The corner or side that a wheel's name says: l of left, fl of vl."""
+    return GENERAL.read(f"wheel_speed_{wheel}").wheel
 
 
 def radius_of(vehicle: Vehicle | None, wheel: str) -> float | None:
