@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:(?:[.,]|:(?=\d{3}))(?P<part>\d{1,9}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
 _TIME = re.compile(_CLOCK)
+_SINCE = re.compile(rf"(?P<days>\d+) days?,? \+?{_CLOCK}")
+"""Of pandas' and Python's time spans: 0 days 00:00:00.050000."""
 _NAMED = (
     re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>(?:\d\d)?\d\d),?[ T]+{_CLOCK}"),
     re.compile(
@@ -53,6 +55,10 @@ def times_of(
     groups = next(m for m in matches if m is not None).re.groupindex
     try:
         seconds = np.array([np.nan if match is None else _seconds(match) for match in matches])
+        if "days" in groups:
+            return seconds + _DAY * np.array(
+                [0 if match is None else int(match["days"]) for match in matches]
+            )
         if "year" not in groups:
             return _without_midnights(seconds)
         if "one" in groups:
@@ -64,6 +70,21 @@ def times_of(
         return None
     since = np.where(np.isnan(seconds), 0.0, seconds)
     return days + np.round(since * 1e9).astype("timedelta64[ns]")
+
+
+def likely_order(cells: Sequence[str | None]) -> str | None:
+    """For dates that do not show which number is the day, the order by which they are nearest together; of one day, month first where
+    hours are of half days. None for any others."""
+    if doubt(cells) is None:
+        return None
+    half = any(cell and cell.rstrip(".mM ")[-1:] in "aApP" for cell in cells)
+    spans: dict[str, float] = {}
+    for order in ORDERS[::-1] if half else ORDERS:
+        times = times_of(cells, order)
+        if times is not None:
+            seconds = times.astype("datetime64[s]").astype(np.float64)
+            spans[order] = float(np.nanmax(seconds) - np.nanmin(seconds))
+    return min(spans, key=lambda order: spans[order], default=None)
 
 
 def doubt(cells: Sequence[str | None]) -> tuple[int, str, str] | None:
@@ -94,7 +115,7 @@ def misfit(cells: Sequence[str | None]) -> int | None:
 def _form(cells: Sequence[str | None]) -> re.Pattern[str] | None:
     """The form of the first cell that is not empty."""
     first = next((cell for cell in cells if cell), None)
-    forms = (_TIME, *_NAMED, _EITHER)
+    forms = (_TIME, _SINCE, *_NAMED, _EITHER)
     return next((f for f in forms if first is not None and f.fullmatch(first.strip())), None)
 
 

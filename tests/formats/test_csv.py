@@ -39,6 +39,12 @@ def put(folder: Path, content: str | bytes, name: str = "log.csv") -> Path:
     return path
 
 
+def in_levels(log: pd.DataFrame) -> pd.DataFrame:
+    """The log with columns of two levels, ``wheel_speed`` above each wheel, and time as the index."""
+    pairs = [tuple(name.rsplit("_", 1)) if name[-2:] in ("_l", "_r") else (name, "") for name in log.columns]
+    return log.set_axis(pd.MultiIndex.from_tuples(pairs), axis=1)
+
+
 DIALECTS: dict[str, Callable[[pd.DataFrame], bytes]] = {
     "comma": lambda log: as_text(log).encode(),
     "semicolon": lambda log: as_text(log, ";").encode(),
@@ -54,6 +60,9 @@ DIALECTS: dict[str, Callable[[pd.DataFrame], bytes]] = {
     "latin-1": lambda log: as_text(log.assign(Höhe=1)).encode("latin-1"),
     "Windows line ends": lambda log: as_text(log).replace("\n", "\r\n").encode(),
     "old Mac line ends": lambda log: as_text(log).replace("\n", "\r").encode(),
+    "pandas' columns of two levels": lambda log: in_levels(log).to_csv(index=False).encode(),
+    "pandas' columns of two levels and index": lambda log: in_levels(log).set_index("time").to_csv().encode(),
+    "pandas' time spans": lambda log: as_text(log.assign(time=pd.to_timedelta(log["time"], unit="s"))).encode(),
     "comments first": lambda log: b"# logger 3\n# run 7, 2021\n\n" + as_text(log).encode(),
     "Excel hint": lambda log: b"sep=;\n" + as_text(log, ";").encode(),
     "blank trailing column": lambda log: as_text(log).replace("\n", ",\n").encode(),
@@ -401,10 +410,24 @@ def test_dates_that_do_not_show_the_day_are_refused_until_the_profile_says_it(
             assert recording.time[1] == pytest.approx(expected)
             month = 4 if dates == "dd/mm/yyyy" else 3
             assert datetime.fromtimestamp(recording.clock_zero, UTC).month == month
-    assert any("may be the 3. of month 4" in note for note in inspect(log).warnings)
+    inspection = inspect(log)
+    assert any("may be the 3. of month 4" in note for note in inspection.warnings)
+    assert f"time: {{from: {name}, dates: dd/mm/yyyy, zero: first}}   # ? " in inspection.profile
     if name == "time":
         with pytest.raises(InputError, match=r"may be the 3\. of month 4"):
             read(log)
+
+
+def test_the_order_of_dates_that_do_not_show_it_is_proposed_by_what_is_likelier(tmp_path: Path) -> None:
+    """'No time column was found', of a day that an American logger wrote."""
+    half = "".join(f"11/03/2024 01:58:{k:02d} PM,1,5\n" for k in range(20))
+    days = "".join(f"11/{day:02d}/2024 23:59:{k:02d},1,5\n" for day in (3, 4) for k in range(40, 60))
+    for rows in (half, days):
+        log = put(tmp_path, f"Timestamp,ground_speed,wheel_speed_l\n{rows}")
+        inspection = inspect(log)
+        assert "time: {from: Timestamp, dates: mm/dd/yyyy, zero: first}   # ? " in inspection.profile
+        (tmp_path / "p.yaml").write_text(inspection.profile)
+        assert read(log, tmp_path / "p.yaml").time[1] == 1
 
 
 def test_dates_in_two_orders_are_refused(tmp_path: Path) -> None:

@@ -55,6 +55,15 @@ def test_a_clock_that_is_the_frames_index_is_the_time(
         read(tmp_path / "rows.parquet")
 
 
+def test_columns_of_two_levels_have_one_name(tmp_path: Path, log: pd.DataFrame) -> None:
+    """\"('wheel_speed', 'l')\" had to be mapped one by one."""
+    pairs = [tuple(name.rsplit("_", 1)) if name[-2:] in ("_l", "_r") else (name, "") for name in log.columns]
+    log.set_axis(pd.MultiIndex.from_tuples(pairs), axis=1).to_parquet(tmp_path / "log.parquet")
+    recording = read(tmp_path / "log.parquet")
+    for name in log.columns:
+        np.testing.assert_array_equal(recording[name], log[name].to_numpy())
+
+
 def test_types_become_numbers_and_labels(tmp_path: Path, log: pd.DataFrame) -> None:
     log["soil"] = log["soil"].astype("category")
     log["ground_speed"] = log["ground_speed"].astype("float32").astype("Float32").where(log.index != 3)

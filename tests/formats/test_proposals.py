@@ -630,6 +630,12 @@ def test_a_wheel_has_one_name_in_a_proposal(tmp_path: Path) -> None:
     assert "drive_torque_left: {from: torque_left}" in inspection.to_text()
 
 
+def test_a_torque_by_our_name_in_a_struct_is_at_the_wheel() -> None:
+    """'at the wheel (scale 1), or motor side, which needs the gear ratio', of what savemat wrote of our own table."""
+    proposal = _propose({"log.drive_torque_fl": SPEED})["drive_torque_fl"]
+    assert (proposal.entry, proposal.is_doubtful) == ({"from": "log.drive_torque_fl"}, False)
+
+
 names = st.one_of(
     st.text(max_size=12), st.builds("_".join, st.lists(st.sampled_from((*WORDS, *UNITS)), max_size=4))
 )

@@ -80,7 +80,7 @@ def columns_of(
         wheel = vocabulary.read(joint).wheel if joint else name.wheel
         if {"twist", "pose"}.intersection(name.words) and _root(column) in odometry:
             concepts.add("odometry")
-        if is_channel(column) or {"drive", "joint"} <= set(name.words):  # behind the gear
+        if is_channel(_last(column)) or {"drive", "joint"} <= set(name.words):  # behind the gear
             concepts.discard("motor")
         if _WITHOUT_WHEELS.intersection(name.words) and not _FUSED.intersection(name.words):
             concepts.discard("odometry")
@@ -136,7 +136,7 @@ def _by_name(column: Column) -> list[Candidate]:
     any_name = split_channel(own) is not None and own not in CHANNELS
     if is_channel(own) and not (any_name and (column.name.unit or column.name.has("command", "statistic"))):
         return [Candidate(own, 1.0, "Terragrip's own name")]
-    last = re.split(r"[./]", own)[-1]  # of a struct or a message
+    last = _last(own)
     if (
         last != own
         and "_" in last
@@ -299,6 +299,11 @@ def _tractor() -> Profile:
 def _on_the_bus() -> dict[str, str]:
     """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
     return {name: channel for channel, source in _tractor().channels.items() for name in source.candidates}
+
+
+def _last(column: str) -> str:
+    """A column's name inside its struct or message."""
+    return re.split(r"[./]", column)[-1]
 
 
 def _root(column: str) -> str:

@@ -58,9 +58,9 @@ def detect(data: bytes, source: str) -> Dialect:
     separator, decimal = _best(lines)
     table = [split(line, separator) for line in lines]
     table[0] = split(_without_mark(lines[0]), separator)
-    grouped = _under_groups(table, decimal)
-    if grouped is not None:
-        start, table = _after_lines(data, start, 1), [grouped, *table[2:]]
+    joined, over = _of_two_levels(table, decimal) or (_under_groups(table, decimal), 2)
+    if joined is not None:
+        start, table = _after_lines(data, start, over - 1), [joined, *table[over:]]
     header, second = table[0], table[1] if len(table) > 1 else []
     if sum(_is_number(cell, decimal) for cell in header) > len(header) / 2:
         hint = "put a header row above the numbers"
@@ -114,6 +114,26 @@ def _unit_in_all(cells: tuple[str, ...]) -> str | None:
     """The one unit that all numbers of a column have behind them."""
     found = {unit_in(cell) for cell in cells if cell.lower() not in _EMPTY}
     return found.pop() if len(found) == 1 else None
+
+
+def _of_two_levels(table: list[list[str]], decimal: str) -> tuple[list[str], int] | None:
+    """The names of a header as pandas writes columns of two levels, ``wheel_speed`` above each of fl, fr ..., and how many rows it has:
+    a third one names the index. None of any other."""
+    if len(table) < 4 or len(table[0]) != len(table[1]):
+        return None
+    groups, names, third = table[:3]
+    pairs, indexed = list(zip(groups, names, strict=True)), not any(third[1:])
+    below, above = ([name for name in level if name] for level in (names, groups))
+    if (
+        len(set(pairs)) < len(pairs)
+        or len(set(above)) == len(above)
+        or all(is_common(_bare(n)) for n in below)
+    ):
+        return None
+    if not indexed and any(_is_number(name, decimal) for name in below):
+        return None
+    joined = ["_".join(filter(None, pair)) for pair in pairs]
+    return ([third[0], *joined[1:]], 3) if indexed else (joined, 2)
 
 
 def _under_groups(table: list[list[str]], decimal: str) -> list[str] | None:

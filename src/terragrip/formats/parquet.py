@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +36,7 @@ def parquet_on_disk(path: str) -> TableOnDisk:
         whole = [str(field.name) for field in fields]
         stated = units_of_fields(file.schema_arrow)
         count = int(file.metadata.num_rows)
-        named, behind = names_and_units(whole)
+        named, behind = names_and_units([_of_levels(name) for name in whole])
         spelt = dict(zip(named, whole, strict=True))
         units = {name: unit for name in named if (unit := behind.get(name) or stated.get(spelt[name]))}
         unreadable = tuple(name for name, field in zip(named, fields, strict=True) if not _is_readable(field))
@@ -59,6 +61,17 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     twice = tuple(name for name in names if named.count(name) > 1)
     is_long = os.path.getsize(path) >= _LONG
     return TableOnDisk(names, units, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
+
+
+def _of_levels(name: str) -> str:
+    """The name of a column of several levels, which pandas writes as a tuple, in one: ``wheel_speed_fl``."""
+    if not re.fullmatch(r"\((['\"]).*\1\)", name):
+        return name
+    try:
+        levels = ast.literal_eval(name)
+    except (ValueError, SyntaxError):
+        return name
+    return "_".join(str(level) for level in levels if level != "")
 
 
 def _index_columns(schema: pa.Schema) -> list[str]:

@@ -143,6 +143,7 @@ def profile_text(
         lines.append("# time: {from: ???, unit: s}   # needed: no column looked like time")
     else:
         entry = {"from": stamp.name} | ({} if stamp.unit == "s" else {"unit": stamp.unit})
+        entry |= {"dates": stamp.dates} if stamp.dates else {}
         doubt = f"   # ? {stamp.doubt}" if stamp.doubt else ""
         lines.append(f"time: {_flow(entry | ({'zero': 'first'} if since_1970 else {}))}{doubt}")
     if dbc:

@@ -27,7 +27,7 @@ from terragrip.recording.repeats import Repeats, merged
 from terragrip.recording.schema import LABELS, TIME
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
-from terragrip.written_times import times_of
+from terragrip.written_times import doubt, likely_order, times_of
 
 _LONG, _ENOUGH = 200_000_000, 60_000_000  # bytes of a log that is looked at in parts, and of these parts
 
@@ -75,12 +75,18 @@ class Seen:
             for n, c in log.columns.items()
             if c.dtype == object and n not in (*LABELS, *written)
         }
-        dated = {n: times for n, cells in texts.items() if (times := times_of(cells)) is not None}
+        orders = {n: order for n, cells in texts.items() if (order := likely_order(cells)) is not None}
+        dated = {
+            n: times for n, cells in texts.items() if (times := times_of(cells, orders.get(n))) is not None
+        }
         log = replace(log, columns={**log.columns, **written, **dated})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
         dates = tuple(n for n, c in log.columns.items() if c.dtype.kind in "mM")
         stamp = find_time(numbers, dates, log.units, vocabulary)
         repeats = Repeats()
+        if stamp is not None and stamp.name in orders:
+            problem = (doubt(texts[stamp.name]) or (0, "", ""))[1]
+            stamp = stamp._replace(dates=orders[stamp.name], doubt=problem)
         if stamp is not None:
             columns, repeats = merged(log.columns, stamp[0])
             log = Stamps(stamp.name, stamp.unit).corrected(replace(log, columns=columns))

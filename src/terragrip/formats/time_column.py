@@ -23,11 +23,12 @@ _FIELD_RATE = 5.0  # s between samples: no log of a drive has more
 
 
 class TimeColumn(NamedTuple):
-    """The column that holds a log's time, its unit, and what is doubtful about that."""
+    """The column that holds a log's time, its unit, what is doubtful about that, and the order of its dates where they do not show it."""
 
     name: str
     unit: str
     doubt: str = ""
+    dates: str = ""
 
 
 def find_time(
