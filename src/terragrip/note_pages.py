@@ -86,6 +86,7 @@ PAGES = (
     ("with a 'driveline' in the vehicle file", "vehicle#engine-torque-in-place-of-wheel-torques"),
     ("The drive torques read the same in", "checks#units-scales-and-zeros"),
     ("if it is of the load alone", "vehicle#a-mass-that-changes"),
+    ("places a payload, but the log has no mass", "vehicle#a-mass-that-changes"),
     ("The engine's own friction is not in the log", "vehicle#engine-torque-in-place-of-wheel-torques"),
     ("frames are in no DBC or table", "formats#can-logs"),
     ("of the DBC's messages occurs in the log", "formats#can-logs"),

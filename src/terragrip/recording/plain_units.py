@@ -92,9 +92,18 @@ def gravity_warnings(recording: Recording) -> list[str]:
 
 
 def mass_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
-    """A mass that never comes near the vehicle file's: that of the load alone, as a tank's level gives it."""
+    """A mass that never comes near the vehicle file's: that of the load alone, as a tank's level gives it. And a load that the file
+    places, of which neither log nor file says how much it is or may be."""
     size = _typical_size(recording, "mass")
-    if vehicle is None or size is None or size > _EMPTY * vehicle.mass:
+    if vehicle is None:
+        return []
+    pulls = any(name.startswith(("drive_torque_", "engine_torque")) for name in recording.channels)
+    if vehicle.payload is not None and vehicle.uncertainty.mass is None and size is None and pulls:
+        return [
+            "The vehicle file places a payload, but the log has no mass: the file's counts throughout, and by what it is off adhesion and "
+            "resistance are, beyond their intervals. Log the mass, or write 'uncertainty: {mass: 25 %}' (0 if the load does not change)."
+        ]
+    if size is None or size > _EMPTY * vehicle.mass:
         return []
     return [
         f"mass reads up to {size:.4g} kg, under half of the vehicle file's {vehicle.mass:.4g} kg: if it is of the load alone, add the "
