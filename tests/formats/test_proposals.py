@@ -636,6 +636,37 @@ def test_a_torque_by_our_name_in_a_struct_is_at_the_wheel() -> None:
     assert (proposal.entry, proposal.is_doubtful) == ({"from": "log.drive_torque_fl"}, False)
 
 
+@pytest.mark.parametrize("element", ["{}0 {}1", "{}_0 {}_1", "{}[0] {}[1]"])
+def test_joints_of_a_message_in_a_table_are_named_by_its_own_columns(tmp_path: Path, element: str) -> None:
+    names, speeds, torques = ([n.format(w) for n in element.split()] for w in ("name", "velocity", "effort"))
+    columns = {"time": TIME, "gps_speed_mps": SPEED}
+    for k, side in enumerate(("left", "right")):
+        columns |= {names[k]: f"wheel_{side}_joint", speeds[k]: SPEED / 0.2, torques[k]: 5 + np.sin(TIME + k)}
+    table = pd.DataFrame(columns)
+    table.to_csv(tmp_path / "log.csv", index=False)
+    recognised = inspect(tmp_path / "log.csv").recognised
+    assert recognised["wheel_speed_l"] == (speeds[0],)
+    assert recognised["drive_torque_r"] == (torques[1],)
+    # In another order from row to row the same columns are of any joint: effort_1 was proposed for a wheel 1.
+    table.loc[::3, names] = table.loc[::3, names[::-1]].to_numpy()
+    table.to_csv(tmp_path / "mixed.csv", index=False)
+    inspection = inspect(tmp_path / "mixed.csv")
+    assert set(inspection.recognised) == {"ground_speed"}
+    assert any("other joints from row to row. Make a column of each joint" in w for w in inspection.warnings)
+
+
+def test_torques_counted_from_0_are_of_no_known_wheel() -> None:
+    """effort_1 was the torque of a wheel 1, the second one's, and effort_0 nobody's."""
+    assert _propose({f"effort_{k}": 5 + np.sin(TIME + k) for k in range(4)}) == {}
+
+
+def test_lists_in_cells_are_named(tmp_path: Path) -> None:
+    table = pd.DataFrame({"time": TIME, "gps_speed_mps": SPEED, "velocity": [[v, v] for v in SPEED / 0.2]})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    warnings = inspect(tmp_path / "log.csv").warnings
+    assert "column velocity has a list in each row: make a column of each of its elements." in warnings
+
+
 names = st.one_of(
     st.text(max_size=12), st.builds("_".join, st.lists(st.sampled_from((*WORDS, *UNITS)), max_size=4))
 )

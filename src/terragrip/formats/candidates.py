@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
@@ -71,7 +71,7 @@ def columns_of(
 ) -> dict[str, Column]:
     """Every numeric column's name as read, a machine's ``namespace`` left out; ``constants`` are the texts that never change, by column."""
     odometry = {_root(c) for c, text in constants.items() if "odometry" in vocabulary.read(text).concepts}
-    alike, several = _numbered(numbers), _of_several(numbers)
+    (alike, from_zero), several = _numbered(numbers), _of_several(numbers)
     result = {}
     for column in numbers:
         name, stated = vocabulary.read(column.removeprefix(namespace)), units.get(column)
@@ -85,7 +85,7 @@ def columns_of(
         if _WITHOUT_WHEELS.intersection(name.words) and not _FUSED.intersection(name.words):
             concepts.discard("odometry")
         of_one = "current" in concepts or not concepts & {"wheel", "motor", "torque"}
-        if column not in alike and (of_one or not wheel.isdigit()):
+        if column not in alike and (of_one or not wheel.isdigit() or column in from_zero):
             wheel = wheel.lstrip("0123456789")  # the number counts no wheels and no axles
         readable = _read(stated)
         if readable and name.unit and kind_of(readable) != kind_of(name.unit):
@@ -98,9 +98,14 @@ def columns_of(
 
 def _joint_of(column: str, constants: Mapping[str, str]) -> str:
     """The joint whose value a numbered column is, empty if none: name0 = wheel_left_joint says of velocity0 which it is."""
-    number = re.search(r"\d+$", column)
-    names = (c for c in constants if number and c.endswith(f"name{number[0]}") and _root(c) == _root(column))
-    return constants.get(next(names, ""), "")
+    return constants.get(joint_column(column, constants) or "", "")
+
+
+def joint_column(column: str, texts: Iterable[str]) -> str | None:
+    """The text column that names the joint of a numbered one, ``name_0`` of ``velocity_0``; None if there is none."""
+    number = re.search(r"[\[_]?\d+\]?$", column)
+    names = (c for c in texts if number and c.endswith(f"name{number[0]}") and _root(c) == _root(column))
+    return next(names, None)
 
 
 def _read(unit: str | None) -> str | None:
@@ -312,17 +317,17 @@ def _root(column: str) -> str:
     return parts[0] if len(parts) > 1 else ""
 
 
-def _numbered(columns: Sequence[str]) -> frozenset[str]:
-    """Columns that differ from another by a number alone, counted from 1: of those from 0 nobody knows which wheel is which."""
+def _numbered(columns: Sequence[str]) -> tuple[frozenset[str], frozenset[str]]:
+    """Columns that differ from another by a number alone: those counted from 1, and those from 0, of which nobody knows which wheel is
+    which."""
     stems: dict[str, list[str]] = {}
     for column in columns:
         stems.setdefault(re.sub(r"\d+(st|nd|rd|th)?", "#", column), []).append(column)
-    counted = (
-        group
-        for group in stems.values()
-        if len(group) > 1 and not any(re.search(r"(?<!\d)0(?!\d)", c) for c in group)
-    )
-    return frozenset(c for group in counted for c in group)
+    counted: tuple[set[str], set[str]] = set(), set()
+    for group in stems.values():
+        if len(group) > 1:
+            counted[any(re.search(r"(?<!\d)0(?!\d)", c) for c in group)].update(group)
+    return frozenset(counted[0]), frozenset(counted[1])
 
 
 def _of_several(columns: Sequence[str]) -> frozenset[str]:

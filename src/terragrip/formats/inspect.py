@@ -16,7 +16,7 @@ from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.profile import Profile
 from terragrip.formats.proposal import Fit, fit_of, is_ready, missing_channels, refusal
 from terragrip.formats.reading import recording_of
-from terragrip.formats.recognition import silent
+from terragrip.formats.recognition import of_one_joint, silent
 from terragrip.formats.seen import Seen, read_whole_or_thinned, size_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.signs import add_signs
@@ -143,6 +143,7 @@ def inspect(
     if recording is None:
         warnings += seen.repeats.notes()
     present = proposals.keys() | fits.channels
+    known = of_one_joint(seen.numbers(), seen.texts())
     ready = recording is not None and is_ready(recording)
     return Inspection(
         file=str(log.source),
@@ -152,7 +153,7 @@ def inspect(
         columns=tuple(_column_summary(name, seen) for name in seen.columns),
         recognised={channel: proposal.columns for channel, proposal in proposals.items()},
         proposals=proposals,
-        missing=tuple(missing_channels(present, seen.stamp is not None, seen.columns, machine)),
+        missing=tuple(missing_channels(present, seen.stamp is not None, known, machine)),
         warnings=tuple(warnings),
         ready=ready,
         fitting=fits.names,

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.formats.agreement import Agreement
 from terragrip.formats.axle_torques import axle_torque_hints, is_of_an_axle, of_the_only_wheel
-from terragrip.formats.candidates import Column, candidates_of, columns_of
+from terragrip.formats.candidates import Column, candidates_of, columns_of, joint_column
 from terragrip.formats.channel_proposal import Proposal, proposal_of
 from terragrip.formats.evidence import Evidence
 from terragrip.formats.indirect import add_indirect, velocity_in_the_plane
@@ -56,6 +56,7 @@ def propose(
     machines (`machines_among`) the first is proposed.
     """
     constants = _constants(texts) if isinstance(texts, Mapping) else {}
+    numbers = of_one_joint(numbers, texts)
     spaces: dict[str, list[str]] = {}
     for name in numbers:
         spaces.setdefault(namespace_of(name), []).append(name)
@@ -72,6 +73,13 @@ def propose(
     result.left_out += tuple(sentences)
     result.namespace = home
     return result
+
+
+def of_one_joint(numbers: Mapping[str, Floats], texts: Texts | tuple[str, ...]) -> dict[str, Floats]:
+    """The columns without those of joints that are named anew in each row."""
+    constants = _constants(texts) if isinstance(texts, Mapping) else {}
+    changing = [name for name in texts if name not in constants]
+    return {name: values for name, values in numbers.items() if joint_column(name, changing) is None}
 
 
 def _rims(columns: Mapping[str, Column], namespace: str) -> list[str]:

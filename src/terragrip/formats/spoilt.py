@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -17,6 +18,9 @@ from terragrip.written_times import FORMS, doubt
 
 _ROWS = 100_000  # of a column that are looked at
 _MOST = 0.5  # of the cells are numbers: the column is one of numbers
+_JOINT = re.compile(r"(?:^|[^a-z])name[\[_]?\d+\]?$")
+"""Of a message of joints, which may be in any order."""
+_LIST = re.compile(r"(\w+\()?[\[(].*,.*[\])]$")
 _LISTED = 4  # columns that are named
 
 
@@ -39,12 +43,30 @@ def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, t
         found = doubt(cells)
         if found is not None:
             notes += [] if timed else [f"column {name}, row {found[0] + 1}: {found[1]}; {found[2]}."]
+        elif any(cell and _LIST.match(cell) for cell in cells[:10]):
+            notes.append(f"column {name} has a list in each row: make a column of each of its elements.")
         elif name not in LABELS:
             notes += _of_numbers(name, cells)
             if not notes and not timed and read.has("time") and any(cells):
                 first = next(row for row, cell in enumerate(cells) if cell)
                 notes.append(f"column {name}, row {first + 1}: {cells[first]!r} is not a time; {FORMS}.")
-    return notes[:_LISTED] + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
+    return (
+        notes[:_LISTED]
+        + _of_any_joint(texts)
+        + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
+    )
+
+
+def _of_any_joint(texts: Mapping[str, npt.NDArray[Any]]) -> list[str]:
+    """A sentence where columns name another joint from row to row, so that those of its number are of any joint."""
+    changing = [
+        name
+        for name, cells in texts.items()
+        if _JOINT.search(name) and len({*cells[:_ROWS]} - {None, ""}) > 1
+    ]
+    names = ", ".join(changing[:_LISTED])
+    sentence = f"{names}: other joints from row to row. Make a column of each joint, or give the bag itself."
+    return [sentence] if changing else []
 
 
 def _of_numbers(name: str, cells: list[str | None]) -> Iterator[str]:

@@ -277,6 +277,7 @@ class Vocabulary:
             return name, None
         text, plain = bracket[1], bracket[1].lower()
         unit = text if is_common(text) or text == "G" else self.unit_word(plain)
+        unit = None if text.isdigit() else unit  # speed[1]
         is_word = unit is None and len(plain) > 2 and plain in self._known
         if is_word or not 0 < len(text) <= 10 or re.search(r"\s\w{3,}", text):
             return name, None
