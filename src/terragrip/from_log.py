@@ -84,8 +84,19 @@ def estimate_file(
         progress=progress,
     )
     tally, notes = Tally(), dict[str, None]()
-    parts = _observed(_labelled(parts, labels or {}), observe)
-    write_parts(_counted(parts, tally, notes) if summary else parts, output)
+
+    def followed() -> Iterator[Estimates]:
+        for part in parts:
+            same = {name: np.full(len(part), text, dtype=object) for name, text in (labels or {}).items()}
+            part = replace(part, labels={**part.labels, **same})
+            if observe is not None:
+                observe(part)
+            if summary:
+                tally.add(part)
+                notes.update(dict.fromkeys(part.notes))
+            yield part
+
+    write_parts(followed(), output)
     return tally.text(notes, os.fspath(output)) if summary else ""
 
 
@@ -105,23 +116,3 @@ def _times(file: PathLike) -> tuple[float, Floats]:
     zero = (Estimates.read_about(file).get("recording") or {}).get("time_zero")
     time = pq.read_table(os.fspath(file), columns=["time"]).column("time").to_numpy()
     return 0.0 if zero is None else datetime.fromisoformat(zero).timestamp(), time
-
-
-def _labelled(parts: Iterator[Estimates], labels: Mapping[str, str]) -> Iterator[Estimates]:
-    for part in parts:
-        same = {name: np.full(len(part), text, dtype=object) for name, text in labels.items()}
-        yield replace(part, labels={**part.labels, **same}) if same else part
-
-
-def _observed(parts: Iterator[Estimates], observe: Callable[[Estimates], None] | None) -> Iterator[Estimates]:
-    for part in parts:
-        if observe is not None:
-            observe(part)
-        yield part
-
-
-def _counted(parts: Iterator[Estimates], tally: Tally, notes: dict[str, None]) -> Iterator[Estimates]:
-    for part in parts:
-        tally.add(part)
-        notes.update(dict.fromkeys(part.notes))
-        yield part

@@ -40,7 +40,7 @@ def estimate_with_channel_nis(
     places = _places(estimator.engine.slots_in)
     estimator.engine.slots_out.update(places)
     time, columns = prepared(estimator, log)
-    out = table_of((*estimator.columns, *places), len(time))
+    out = table_of(estimator.columns, len(time))
     event = np.empty(len(time), dtype=np.uint8)
     estimator.engine.run(time, columns, out, event)
     return finished(estimator, log, out, event, notes_of(estimator, log), smooth=False)

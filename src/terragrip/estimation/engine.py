@@ -80,7 +80,6 @@ class Engine:
         self.slots_in, self.slots_out = dict(slots_in), dict(slots_out)
         self._used = 1 + max(self.slots_out.values())
         self.inputs = tuple(self.slots_in)
-        self.outputs = tuple(self.slots_out)
         self.filtered_only = tuple(name for name, slot in self.slots_out.items() if not _is_smoothed(slot))
         self._size = lib.tg_estimator_size(settings.tuning.policy)
         self._memory = ffi.new("char[]", self._size + 64)

@@ -64,11 +64,6 @@ class EngineEstimator(TractionEstimator):
         self._places = {name: place for name, place in super().places.items() if machine.shows(name)}
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of an estimate's columns besides ``time`` and ``event``."""
-        return tuple(self._places)
-
-    @property
     def places(self) -> dict[str, int]:
         """The position of each column in an estimate's values."""
         return self._places

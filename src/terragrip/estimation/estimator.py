@@ -201,7 +201,7 @@ class TractionEstimator:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of an estimate's columns besides ``time`` and ``event``."""
-        return self._engine.outputs
+        return tuple(self.places)
 
     @property
     def places(self) -> dict[str, int]:

@@ -17,7 +17,7 @@ from terragrip.errors import InputError
 from terragrip.formats.boundary import needed, reading
 from terragrip.formats.matlab_hdf5 import is_hdf5, tree_of
 from terragrip.formats.matlab_long import long_matlab
-from terragrip.formats.matlab_objects import TICKS, plain
+from terragrip.formats.matlab_objects import plain
 from terragrip.formats.matlab_records import IN_RECORDS, STREAM, resolved
 from terragrip.formats.matlab_signals import Contents, matrices_with_time, seconds_of, walk
 from terragrip.formats.matlab_values import Array, Opaque, read_array
@@ -80,7 +80,7 @@ def items_of(path: str, first_run: bool) -> Reading:
             names = [name for name, value in tree.items() if _holds_object(value)]
         loaded = matio.load_from_mat(path, variable_names=names, add_table_attrs=True)
         for name in names or [name for name in loaded if not name.startswith("__")]:
-            if name in loaded and (value := resolved(plain(loaded.pop(name)), records, TICKS)) is not None:
+            if name in loaded and (value := resolved(plain(loaded.pop(name)), records)) is not None:
                 tree[name] = value
         contents = _contents(tree, path, first_run)
         chosen = yield _outline(contents)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.boundary import DAMAGE
+from terragrip.formats.matlab_objects import TICKS
 from terragrip.formats.matlab_values import Array, Opaque
 
 STREAM = "#sigstream#"
@@ -29,22 +30,21 @@ IN_RECORDS = "Dataset saved with -v7.3"
 """Stands for a series whose samples are in records that are not there, or cannot be read."""
 
 
-def resolved(value: Any, records: Any, ticks: Mapping[str, float]) -> Any:
+def resolved(value: Any, records: Any) -> Any:
     """A value of `terragrip.formats.matlab_objects.plain` in which series stand where structs described records.
 
-    A series is ``{"Time": (n,) s, "Data": (n, columns), "Unit": text}``; its samples are read when they are asked for. ``ticks``:
-    seconds by the names of units of time.
+    A series is ``{"Time": (n,) s, "Data": (n, columns), "Unit": text}``; its samples are read when they are asked for.
     """
     if isinstance(value, list):
-        return [resolved(part, records, ticks) for part in value]
+        return [resolved(part, records) for part in value]
     if not isinstance(value, Mapping):
         return value
     if _is_series(value):
         try:
-            return _series(value, records, ticks)
+            return _series(value, records)
         except DAMAGE:
             return Opaque(IN_RECORDS)
-    return {key: resolved(part, records, ticks) for key, part in value.items()}
+    return {key: resolved(part, records) for key, part in value.items()}
 
 
 def _is_series(struct: Mapping[str, Any]) -> bool:
@@ -53,12 +53,12 @@ def _is_series(struct: Mapping[str, Any]) -> bool:
     )
 
 
-def _series(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float]) -> dict[str, Any]:
+def _series(struct: Mapping[str, Any], records: Any) -> dict[str, Any]:
     """The series that a struct tells of; raises ValueError or LookupError where it cannot be read."""
     about = struct.get("SignalAttributes")
     if not isinstance(about, Mapping):
         raise ValueError("a series without attributes")
-    time, count = _time(struct, records, ticks)
+    time, count = _time(struct, records)
     result = {"Time": time, "Data": _data(struct, about, records, count)}
     unit = struct.get("DataUnits", struct.get("Units"))
     if isinstance(unit, Mapping):
@@ -70,10 +70,10 @@ def _series(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float])
     return result | ({"Unit": unit} if isinstance(unit, str) and unit.strip() else {})
 
 
-def _time(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float]) -> tuple[Array, int]:
+def _time(struct: Mapping[str, Any], records: Any) -> tuple[Array, int]:
     """The instants [s], and how many there are."""
     regular, kept, written = (struct.get(key) for key in ("CompressedTime", "TimeR2", "Time"))
-    scale, zero = _clock(struct, ticks)
+    scale, zero = _clock(struct)
     if _held(regular) == 3:
         start, step, counted = (float(x) for x in np.ravel(np.asarray(regular)))
         if not 0 < counted <= 1e10:
@@ -91,14 +91,14 @@ def _time(struct: Mapping[str, Any], records: Any, ticks: Mapping[str, float]) -
     return Array((count, 1), lambda: scale * (read().view("<f8") - zero)), count
 
 
-def _clock(struct: Mapping[str, Any], ticks: Mapping[str, float]) -> tuple[float, float]:
+def _clock(struct: Mapping[str, Any]) -> tuple[float, float]:
     """Seconds of a unit of time, and which number of units is zero: days count from the year 0 in a timetable of dates."""
     properties = struct.get("TableProps")
     if isinstance(properties, Mapping):
         return (_DAY, _DAYS_TO_1970) if properties.get("TimeFormat") == "datetime" else (1.0, 0.0)
     unit = struct.get("TimeUnits")
     unit = unit.get("Value") if isinstance(unit, Mapping) else unit
-    return ticks.get(unit.strip().lower(), 1.0) if isinstance(unit, str) else 1.0, 0.0
+    return TICKS.get(unit.strip().lower(), 1.0) if isinstance(unit, str) else 1.0, 0.0
 
 
 def _data(struct: Mapping[str, Any], about: Mapping[str, Any], records: Any, count: int) -> Array:

@@ -25,15 +25,12 @@ class TableWriter(Protocol):
 
     def write(self, part: Estimates) -> None:
         """Write the rows of a part."""
-        ...
 
     def close(self) -> None:
         """Complete the file; raises InputError where it cannot hold what was written."""
-        ...
 
     def drop(self) -> None:
         """Discard the file, which stays incomplete."""
-        ...
 
 
 @dataclass(frozen=True)
