@@ -154,6 +154,15 @@ def test_a_named_noise_wins_over_the_vehicle_file(noisy):
     assert np.median(trusting["ground_speed_std"]) < np.median(plain["ground_speed_std"])
 
 
+def test_a_row_of_itertuples_is_refused_with_the_way_to_a_dict(noisy):
+    """A traceback: "'Pandas' object has no attribute 'keys'"."""
+    row = next(noisy.recording.to_pandas().itertuples(index=False))
+    estimator = TractionEstimator(robot())
+    with pytest.raises(InputError, match=r"Pandas is no sample; give a dict .* row\._asdict\(\)"):
+        estimator.update(row)
+    estimator.update(row._asdict())
+
+
 def test_noise_set_before_the_first_sample_is_that_of_a_new_estimator(noisy):
     changed, new = TractionEstimator(robot()), TractionEstimator(robot(), sensors={"ground_speed": 0.005})
     changed.set_noise({"ground_speed": 0.005}, {})

@@ -89,6 +89,18 @@ def test_blocks_give_the_summary_of_the_whole(drive: tuple[tg.Estimates, str]) -
     assert tally.text(estimates.notes).splitlines() == text.splitlines()
 
 
+@pytest.mark.parametrize("cut", [1000, 2000])
+def test_a_clock_that_was_set_in_the_log_is_no_time_driven(drive: tuple[tg.Estimates, str], cut: int) -> None:
+    """'in 28333335.8 min', where the clock went from 1970 to today between two rows."""
+    estimates, _ = drive
+    time = estimates.time + 1.7e9 * (np.arange(len(estimates)) >= 1000)
+    leaping = replace(estimates, time=time)
+    tally = Tally()
+    for rows in (slice(0, cut), slice(cut, None)):
+        tally.add(leaping.select(rows))
+    assert " m in 40.0 s, " in tally.text()
+
+
 def test_a_label_that_begins_with_a_blocks_last_row_has_its_time(drive: tuple[tg.Estimates, str]) -> None:
     """A row lasts until the next one, which the next block has."""
     estimates, _ = drive

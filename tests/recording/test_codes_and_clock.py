@@ -236,6 +236,13 @@ def test_a_time_that_runs_back_says_what_to_do(back: float, hint: str) -> None:
         Recording.from_frame(columns | {"time": time})
 
 
+def test_rows_in_no_order_are_to_be_sorted() -> None:
+    """'split the log there: another one seems to begin', of a table that was shuffled."""
+    columns, order = drive(), np.random.default_rng(0).permutation(4000)
+    with pytest.raises(InputError, match=r"sort the rows by time, in pandas: table.sort_values\('time'\)"):
+        Recording.from_frame({name: values[:4000][order] for name, values in columns.items()})
+
+
 def test_a_ground_speed_that_is_the_wheels_own_is_named() -> None:
     columns = drive()
     own = RADIUS * np.mean([columns[f"wheel_speed_{w}"] for w in WHEELS], axis=0)

@@ -221,8 +221,13 @@ class TractionEstimator:
         InputError, with the estimator unchanged, if time is missing or does not increase, a value is not a
         finite number, or a name is no column but like one that the estimator uses (mistyped, or of a wheel that the vehicle lacks).
         """
-        if not self._accepted.issuperset(sample.keys()):
-            self._accept(sample.keys())
+        try:
+            names = sample.keys()
+        except AttributeError as error:
+            hint = "give a dict of numbers by column; a row of itertuples becomes one by row._asdict()"
+            raise InputError(f"{type(sample).__name__} is no sample", hint=hint) from error
+        if not self._accepted.issuperset(names):
+            self._accept(names)
         time = sample.get("time")
         if time is None:
             raise unusable(sample, self._engine.inputs)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.grouped import quantities
+from terragrip.recording.plain_units import leapt
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -37,6 +38,7 @@ class Tally:
     moving: dict[str, float] = field(default_factory=dict)
     sample: dict[str, list[npt.NDArray[Any]]] = field(default_factory=dict)
     _first: float | None = None
+    _leapt: float = 0.0
     _last_event: int = 0
     _last_moving: tuple[str, float] | None = None
     _every: int = 1
@@ -47,7 +49,8 @@ class Tally:
         if self._first is None:
             self._first, self.about, self.wheels = float(block.time[0]), block.about, block.wheels
         self.rows += len(block)
-        self.duration = float(block.time[-1]) - self._first
+        self._leapt += leapt(np.concatenate(([self._first + self._leapt + self.duration], block.time)))
+        self.duration = float(block.time[-1]) - self._first - self._leapt
         if "distance" in block:
             self.distance = float(np.nanmax(block["distance"], initial=self.distance))
         self._count_events(block.event_codes)

@@ -250,10 +250,16 @@ def check_time(time: Floats, source: str | None, *, first_row: int = 0, after: f
     raise InputError(problem, file=source, place=place(TIME, row, time, first_row=first_row), hint=hint)
 
 
+_MIXED = 0.1
+"""Share of steps back in time above which a table's rows are in no order, and no other log begins at one of them."""
+
+
 def _way_out(back: float, time: Floats, row: int) -> str:
     """What to do where time runs back by ``back`` [s] at a row."""
     if abs(back - _HOUR) < _ROUGHLY:
         return "was the clock set to winter time? Write times in UTC, or add 3600 s from there on"
+    if np.mean(np.diff(time) < 0) > _MIXED:
+        return "sort the rows by time, in pandas: table.sort_values('time')"
     if row > 1 and time[row] <= time[1]:
         return "split the log there: another one seems to begin"
     return "sort the rows, or split the log there"

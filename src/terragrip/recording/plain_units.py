@@ -111,6 +111,12 @@ def mass_warnings(recording: Recording, vehicle: Vehicle | None) -> list[str]:
     ]
 
 
+def leapt(time: Floats) -> float:
+    """Seconds of ``time`` (n,) [s] in leaps of over a year, of a clock that was set there: nobody drove so long."""
+    steps = np.diff(time)
+    return float(steps[steps > _YEAR].sum())
+
+
 def spacing_warnings(recording: Recording) -> list[str]:
     """Rows that are further apart, or closer, than those of a drive, a time written as hhmmss, and a clock set in the log."""
     if len(recording) < 10:

@@ -16,6 +16,7 @@ from terragrip import __version__
 from terragrip.errors import InputError
 from terragrip.estimation import Estimates
 from terragrip.ground.events import Event, events
+from terragrip.recording.plain_units import leapt
 from terragrip.report import (
     advice_sections,
     ground_sections,
@@ -278,7 +279,7 @@ def _summary(run: Run) -> _Summary:
     events = run.estimates["event"].value_counts() if "event" in run.estimates else {}
     shares = ", ".join(f"{kind} {count / len(run.time):.0%}" for kind, count in events.items() if kind)
     began = run.began + timedelta(seconds=float(run.time[0])) if run.began is not None else None
-    seconds, metres = float(run.time[-1] - run.time[0]), float(np.nan_to_num(distance))
+    seconds, metres = float(run.time[-1] - run.time[0]) - leapt(run.time), float(np.nan_to_num(distance))
     driven = summary.Driven(run.name, seconds, metres, began)
     return _Summary(driven, run.soils, run.method, shares or "–", run.clock)
 
