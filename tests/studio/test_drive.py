@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from terragrip.estimation import Estimates
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.studio import drive
 from terragrip.studio.shown import Shown, consistency
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
@@ -98,7 +99,7 @@ def test_a_long_run_shows_every_extreme_whatever_the_window(made: Path) -> None:
         wide = slice(max(edges[0], 0), edges[1] + 1)
         assert np.nanmin(slip) == np.nanmin(columns["slip_rr"][wide])
         assert np.nanmax(slip) == np.nanmax(columns["slip_rr"][wide])
-        limit = columns["slip_rr"] + 1.959964 * columns["slip_rr_std"]
+        limit = columns["slip_rr"] + NORMAL_95 * columns["slip_rr_std"]
         assert np.nanmax(high) == np.nanmax(limit[wide])
 
 
@@ -167,7 +168,7 @@ def test_a_whole_run_is_cut_and_a_short_window_is_not(client: TestClient, folder
     slip = table["slip_rr"]
     assert np.nanmin(whole["slip_rr"]) == np.nanmin(slip)
     assert np.nanmax(whole["slip_rr"]) == np.nanmax(slip)
-    spread = 1.959964 * table["slip_rr_std"]
+    spread = NORMAL_95 * table["slip_rr_std"]
     assert np.nanmin(whole["slip_rr:low"]) == np.nanmin(slip - spread)
     assert np.nanmax(whole["slip_rr:high"]) == np.nanmax(slip + spread)
     few = window(client, column=["slip_rr"], width=1000, start=table.time[500], end=table.time[520])

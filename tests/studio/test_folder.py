@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from terragrip.errors import InputError
+from terragrip.formats.registry import suffixes
 from terragrip.studio.folder import Folder
 
 PARTS = st.sampled_from(
@@ -52,6 +53,12 @@ def test_whatever_a_path_is_made_of_it_stays_inside(folder: Path, parts: list[st
     except InputError:
         return
     assert target.is_relative_to(folder.resolve())
+
+
+@pytest.mark.parametrize("suffix", suffixes())
+def test_a_log_of_every_format_is_listed(folder: Path, suffix: str) -> None:
+    (folder / f"drive{suffix}").write_bytes(b"")
+    assert ("recording", f"drive{suffix}") in {(one.kind, one.path) for one in Folder(folder).items()}
 
 
 def test_files_are_listed_by_what_they_hold(client: TestClient, folder: Path, outside: Path) -> None:

@@ -10,6 +10,7 @@ from terragrip.advice.curves import DRAWS, draw_curves, lasting_sd
 from terragrip.advice.optimum import GRID, OverSlip, over_slip
 from terragrip.advice.samples import Samples
 from terragrip.arrays import Floats
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.soil.estimates import torque_scale_sd, zero_slip_sd
 from terragrip.soil.library import Soil
 from terragrip.units import STANDARD_GRAVITY
@@ -19,7 +20,6 @@ SHARE_OF_VARIATION = 0.5
 """Relative SD of a library's resistance where it does not say."""
 GROWTH = (0.06, 0.05)
 """Mean and SD of what resistance grows by over all of slip, where only its mean is known (Brixius: .5/sqrt(Bn))."""
-NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from terragrip.errors import InputError
 from terragrip.estimation.columns import column_named
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.grouped import medians
 from terragrip.figures import BLUE, GRID, INK, LINES, MUTED, ORANGE, VERMILLION, notebook_figure, styled
 from terragrip.html import figure_of, html_notes, html_table
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 Kind = Literal["time", "plane", "map"]
 _MOST = 4000  # points of a line: more a screen does not show
-_NORMAL_95 = 1.96
 _EVENT_COLORS = {"stuck": VERMILLION, "immobilization": ORANGE, "push": BLUE}
 
 
@@ -74,7 +74,7 @@ def _over_time(estimates: Estimates, quantity: str) -> Figure:
             for color, (label, column) in zip(LINES, columns.items(), strict=False):
                 values = estimates[column][every]
                 if f"{column}_std" in estimates:
-                    half = _NORMAL_95 * estimates[f"{column}_std"][every]
+                    half = NORMAL_95 * estimates[f"{column}_std"][every]
                     axes.fill_between(
                         time, values - half, values + half, color=color, alpha=0.15, linewidth=0
                     )

@@ -16,25 +16,6 @@ from terragrip.errors import InputError
 DEPTH, MOST = 4, 5000
 """How deep, and how many files the list goes."""
 
-RECORDINGS = frozenset(
-    [
-        ".csv",
-        ".tsv",
-        ".txt",
-        ".gz",
-        ".mat",
-        ".bag",
-        ".mcap",
-        ".db3",
-        ".mf4",
-        ".blf",
-        ".asc",
-        ".trc",
-        ".log",
-        ".nmea",
-        ".parquet",
-    ]
-)
 PICTURES = frozenset([".png", ".jpg", ".jpeg", ".webp", ".svg"])
 
 
@@ -47,6 +28,11 @@ class Item:
     kind: str
     size: int
     modified: float
+
+
+def taken(path: str) -> InputError:
+    """Why a file or folder is not written over."""
+    return InputError("exists already", file=path, hint="choose another name, or replace it")
 
 
 class Folder:
@@ -76,11 +62,13 @@ class Folder:
             raise InputError("leads out of the studio's folder", file=path)
         return target
 
-    def file(self, path: str) -> Path:
-        """As `resolve`, for a file that exists."""
+    def file(self, path: str, version: str = "") -> Path:
+        """As `resolve`, for a file that exists, and where `version` is given is still that one."""
         target = self.resolve(path)
         if not target.is_file():
             raise InputError("no such file in this folder", file=path, hint="reload the list")
+        if version and self.version(path) != version:
+            raise InputError("was replaced since it was opened", file=path, hint="open it again")
         return target
 
     def profile(self, name: str) -> str:
@@ -89,8 +77,9 @@ class Folder:
 
         return name if name in SHIPPED and not self.resolve(name).exists() else str(self.file(name))
 
-    def new_file(self, path: str, suffixes: tuple[str, ...]) -> Path:
-        """As `resolve`, for a file to be written: its folder exists, its name ends as `suffixes` say."""
+    def new_file(self, path: str, suffixes: tuple[str, ...], *, replace: bool) -> Path:
+        """As `resolve`, for a file to be written: its folder exists, its name ends as `suffixes` say, and there is no such file yet
+        but one to `replace`."""
         target = self.resolve(path)
         if target.suffix.lower() not in suffixes:
             raise InputError(
@@ -98,6 +87,8 @@ class Folder:
             )
         if target.is_dir() or not target.parent.is_dir():
             raise InputError("cannot be written there", file=path, hint="name a file in a folder that exists")
+        if target.exists() and not replace:
+            raise taken(path)
         return target
 
     def version(self, path: str) -> str:
@@ -151,8 +142,10 @@ class Folder:
 
 def kind_of(path: Path) -> str | None:
     """What a file is, by its name and, where that is not enough, by a look inside; None = nothing for the studio."""
+    from terragrip.formats.registry import suffixes
+
     suffix = path.suffix.lower()
-    if suffix == ".parquet":
+    if suffix in (".parquet", ".pq"):
         return "estimates" if _holds_estimates(path) else "recording"
     if suffix == ".json":
         return _kind_of_json(path)
@@ -166,7 +159,7 @@ def kind_of(path: Path) -> str | None:
         return "map" if _holds_map(path) else None
     if suffix in PICTURES:
         return "picture"
-    return "recording" if suffix in RECORDINGS else None
+    return "recording" if path.name.lower().endswith((*suffixes(), ".gz")) else None
 
 
 def _holds_estimates(path: Path) -> bool:

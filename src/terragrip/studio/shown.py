@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError, suggestion
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.recording.stretches import gaps
 from terragrip.studio.formulas import evaluate, names
 from terragrip.studio.tables import Extremes, are_long, buckets, extremes
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from terragrip.recording import Recording
 
 
-LEVEL = 1.959964
-"""Standard deviations of a 95 % interval."""
 MEASURED = "measured:"
 FORMULA = "="
 """What the name of a computed signal begins with: ``=slip_rl - slip_rr``."""
@@ -204,7 +203,11 @@ class Shown:
             return self._nis[side].__getitem__
         if side == "mean" or f"{column}_std" not in columns:
             raise InputError("has no interval", place=f"column {name}")
-        values, std, sign = columns[column], columns[f"{column}_std"], LEVEL if side == "high" else -LEVEL
+        values, std, sign = (
+            columns[column],
+            columns[f"{column}_std"],
+            NORMAL_95 if side == "high" else -NORMAL_95,
+        )
         return lambda rows: values[rows] + sign * std[rows]
 
 

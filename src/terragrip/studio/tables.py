@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from starlette.responses import Response
 
 from terragrip.arrays import Floats, Ints
 
@@ -100,11 +101,10 @@ class Extremes:
         return low, high
 
 
-def packed(head: dict[str, Any], columns: Sequence[npt.NDArray[Any]]) -> bytes:
+def packed(head: dict[str, Any], columns: Sequence[npt.NDArray[Any]]) -> Response:
     """A binary message: length of the head (uint32, little-endian), the head as JSON padded to 8 bytes, the columns one after another
-    in their own types (float64 first keeps all aligned)."""
-    text = json.dumps(head).encode()
+    in their own types (float64 first keeps all aligned). The head's ``count`` says how long each is."""
+    text = json.dumps({**head, "count": len(columns[0])}).encode()
     text += b" " * (-(len(text) + 4) % 8)
-    return b"".join(
-        (len(text).to_bytes(4, "little"), text, *(np.ascontiguousarray(c).tobytes() for c in columns))
-    )
+    parts = (len(text).to_bytes(4, "little"), text, *(np.ascontiguousarray(c).tobytes() for c in columns))
+    return Response(b"".join(parts), media_type="application/octet-stream")

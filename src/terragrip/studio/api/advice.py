@@ -26,7 +26,4 @@ def advice(studio: Here, path: Named, version: str = "") -> dict[str, Any]:
     given, way = advise([table], vehicle)
     order = sorted(given, key=lambda name: -way[name])
     soils = [{"name": name, "metres": way[name], **to_dict({name: given[name]}, way)} for name in order]
-    plain: dict[str, Any] = finite(
-        {"soils": soils, "weight": machine_of(table, vehicle).mass * STANDARD_GRAVITY}
-    )
-    return plain
+    return finite({"soils": soils, "weight": machine_of(table, vehicle).mass * STANDARD_GRAVITY})

@@ -11,21 +11,20 @@ from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 
 from terragrip.errors import InputError, missing_package
-from terragrip.studio.api.files import Named
+from terragrip.studio.api.files import PICTURE_TYPES, Named
 from terragrip.studio.state import Here
 
 router = APIRouter(tags=["map"])
 
 LARGEST = 4096
 """Pixels of a side that a page gets."""
-PLAIN = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
 
 
 @router.get("/basemap")
 def placed(studio: Here, path: Named) -> dict[str, Any]:
     """Corners of a basemap (longitude and latitude, north-west first, clockwise); null where the picture does not say."""
     target = studio.folder.file(path)
-    if target.suffix.lower() in PLAIN:
+    if target.suffix.lower() in PICTURE_TYPES:
         return {"corners": None}
     with _mercator(target, path) as raster:
         west, south, east, north = raster.bounds
@@ -39,7 +38,7 @@ def placed(studio: Here, path: Named) -> dict[str, Any]:
 def picture(studio: Here, path: Named) -> Response:
     """The basemap as a picture that a browser shows."""
     target = studio.folder.file(path)
-    plain = PLAIN.get(target.suffix.lower())
+    plain = PICTURE_TYPES.get(target.suffix.lower())
     if plain is not None:
         return FileResponse(target, media_type=plain)
     with _mercator(target, path) as raster:

@@ -39,7 +39,7 @@ def columns_of(studio: Here, path: Named, vehicle: str = "", profile: str = "") 
     look = studio.logs.get(studio.folder.file(path))
     wheels = tuple(Vehicle.load(studio.folder.file(vehicle)).wheels) if vehicle else ()
     kept = _choice(studio.folder.profile(profile)) if profile else None
-    plain: dict[str, Any] = finite(
+    return finite(
         {
             "kept": kept,
             "rows": look.inspection.rows,
@@ -54,7 +54,6 @@ def columns_of(studio: Here, path: Named, vehicle: str = "", profile: str = "") 
             "channels": look.channels(wheels, kept["channels"] if kept else None),
         }
     )
-    return plain
 
 
 @router.post("/profile", status_code=201)
@@ -67,9 +66,7 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     from terragrip.formats.time_column import TimeColumn
 
     log = studio.folder.file(wanted.log)
-    target = studio.folder.new_file(wanted.output, (".yaml", ".yml"))
-    if target.exists() and not wanted.replace:
-        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    target = studio.folder.new_file(wanted.output, (".yaml", ".yml"), replace=wanted.replace)
     chosen = Profile.from_dict({"time": wanted.time, "channels": wanted.channels}, wanted.output)
     text = profile_text(
         Path(wanted.log).name,

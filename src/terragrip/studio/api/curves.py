@@ -87,7 +87,7 @@ def _known(wanted: CurveRequest) -> tuple[CurveModel, dict[str, float]]:
 def _shown(model: CurveModel, parameters: dict[str, float], held: list[str]) -> dict[str, Any]:
     own = {name: value for name, value in parameters.items() if name != INTERCEPT}
     values = model.value(SLIPS, own, parameters.get(INTERCEPT, 0.0))
-    plain: dict[str, Any] = finite(
+    return finite(
         {
             "slip": SLIPS.tolist(),
             "value": values.tolist(),
@@ -96,4 +96,3 @@ def _shown(model: CurveModel, parameters: dict[str, float], held: list[str]) -> 
             "handles": [vars(one) for one in handles(model, parameters, held)],
         }
     )
-    return plain

@@ -20,7 +20,6 @@ from terragrip.studio.tables import packed
 
 router = APIRouter(tags=["drive"])
 
-BINARY = "application/octet-stream"
 TRACK = 20_000
 """Points of a track."""
 
@@ -33,9 +32,7 @@ Time = Annotated[float, Query(allow_inf_nan=False)]
 def table_of(studio: Studio, path: str, version: str = "") -> Estimates:
     """Estimates of the folder. Raises InputError where the file is no longer the `version` that the page was given: what it draws
     would be a mixture of two runs."""
-    if version and studio.folder.version(path) != version:
-        raise InputError("was replaced since it was opened", file=path, hint="open it again")
-    return studio.estimates.get(studio.folder.file(path))
+    return studio.estimates.get(studio.folder.file(path, version))
 
 
 def recording_for(studio: Studio, table: Estimates, columns: list[str]) -> Recording | None:
@@ -51,7 +48,7 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
     """What a run holds: columns, wheels, time, events with their reasons, soils, the recording it came from, the ground where known."""
     table = table_of(studio, path)
     result = drive.recording_of(studio, table, search=True)
-    plain: dict[str, Any] = finite(
+    return finite(
         {
             "rows": len(table),
             "start": float(table.time[0]) if len(table) else 0.0,
@@ -72,7 +69,6 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             "ground": _ground(studio, path),
         }
     )
-    return plain
 
 
 @router.get("/drive/window")
@@ -97,8 +93,8 @@ def window(
     shown = studio.shown.get(studio.folder.file(path))
     recording = recording_for(studio, table, column)
     cut, place, columns = shown.window(recording, column, start, end, width, axis)
-    head = {"columns": [axis, *column], "count": len(place), "cut": cut}
-    return Response(packed(head, [place, *columns]), media_type=BINARY)
+    head = {"columns": [axis, *column], "cut": cut}
+    return packed(head, [place, *columns])
 
 
 @router.get("/drive/sample")
@@ -108,8 +104,7 @@ def sample(studio: Here, path: Named, time: Time, version: str = "") -> dict[str
     if not len(table):
         raise InputError("holds no rows", file=path)
     result = drive.recording_of(studio, table)
-    plain: dict[str, Any] = finite(drive.sample(table, None if result is None else result[1], time))
-    return plain
+    return finite(drive.sample(table, None if result is None else result[1], time))
 
 
 @router.get("/drive/track")
@@ -131,8 +126,8 @@ def track(
     rows = placed[:: -(-len(placed) // TRACK) or 1]
     names = ["time", "longitude", "latitude", *column]
     columns = [table[name][rows].astype(np.float64) for name in names]
-    head = {"columns": names, "count": len(rows), "cut": len(rows) < len(placed), "of": len(placed)}
-    return Response(packed(head, columns), media_type=BINARY)
+    head = {"columns": names, "cut": len(rows) < len(placed), "of": len(placed)}
+    return packed(head, columns)
 
 
 def _distance(studio: Studio, path: str) -> float | None:

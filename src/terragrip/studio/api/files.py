@@ -8,14 +8,14 @@ import math
 from collections.abc import AsyncIterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, cast
 
 from fastapi import APIRouter, Query, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 
 from terragrip.errors import InputError
 from terragrip.files import replacing, sync
-from terragrip.studio.folder import PICTURES, Folder, kind_of
+from terragrip.studio.folder import PICTURES, Folder, kind_of, taken
 from terragrip.studio.state import Here
 
 router = APIRouter(tags=["folder"])
@@ -23,7 +23,8 @@ router = APIRouter(tags=["folder"])
 Named = Annotated[str, Query(description="Path relative to the folder, with slashes.")]
 
 _REPORT_POLICY = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; font-src data:; frame-ancestors 'none'"
-_SHOWN = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
+PICTURE_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".webp": "image/webp"}
+Plain = TypeVar("Plain")
 
 
 @router.get("/folder")
@@ -64,7 +65,7 @@ async def notices(socket: WebSocket, studio: Here) -> None:
 def get_file(studio: Here, path: Named) -> Response:
     """One file of the folder: a picture to show, anything else as a download."""
     target = studio.folder.file(path)
-    shown = _SHOWN.get(target.suffix.lower())
+    shown = PICTURE_TYPES.get(target.suffix.lower())
     if shown is None:
         return FileResponse(target, media_type="application/octet-stream", filename=target.name)
     return FileResponse(target, media_type=shown)
@@ -121,14 +122,13 @@ def inspect_log(
     inspection = inspect(log, chosen, machine)
     problem = _begun(log, chosen, machine, method) if inspection.ready and machine is not None else None
     root = f"{studio.folder.root}/"
-    plain: dict[str, Any] = {
+    return {
         **finite(inspection.to_dict()),
         "file": path,
         "text": inspection.to_text().replace(root, ""),
         "ready": inspection.ready and problem is None,
         "problem": None if problem is None else problem.replace(root, ""),
     }
-    return plain
 
 
 def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | None:
@@ -145,21 +145,22 @@ def _begun(log: Path, profile: str | None, vehicle: Path, method: str) -> str | 
     return None
 
 
-def finite(value: Any) -> Any:
+def finite(value: Plain) -> Plain:
     """Plain data with null for what JSON cannot hold (NaN, infinities)."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(one) for one in value]
-    return value
+    plain: Any = value
+    if isinstance(plain, float):
+        plain = plain if math.isfinite(plain) else None
+    elif isinstance(plain, dict):
+        plain = {key: finite(one) for key, one in plain.items()}
+    elif isinstance(plain, (list, tuple)):
+        plain = [finite(one) for one in plain]
+    return cast("Plain", plain)
 
 
 def _free(folder: Folder, path: str, replace: bool) -> Path:
     target = folder.resolve(path)
     if target.exists() and not (replace and target.is_file()):
-        raise InputError("exists already", file=path, hint="choose another name, or replace it")
+        raise taken(path)
     if not target.parent.is_dir():
         raise InputError("cannot be written there", file=path, hint="name a folder that exists")
     return target

@@ -126,8 +126,7 @@ def fit(studio: Here, wanted: FitRequest) -> dict[str, Any]:
     result: dict[str, Any] = curve.to_dict()
     result["peak"] = curve.peak()
     result["at_bound"] = curve.at_bound_
-    plain: dict[str, Any] = finite(result)
-    return plain
+    return finite(result)
 
 
 @router.post("/soils/save", status_code=201)
@@ -135,7 +134,7 @@ def save(studio: Here, wanted: SaveRequest) -> dict[str, Any]:
     """Put a soil into a library, which is made where there is none. A soil that is replaced keeps what was measured beside its curve
     (resistance, spread, roughness), by which a drive is recognised on it.
     """
-    target = studio.folder.new_file(wanted.library, (".json",))
+    target = studio.folder.new_file(wanted.library, (".json",), replace=True)
     entry = wanted.model_dump(exclude={"library", "name", "replace"}, exclude_defaults=True)
     soil = soil_of(wanted.name, {"source": wanted.source, **entry}, wanted.library)
     with studio.own.saving():  # two pages that save at once keep both soils
@@ -154,8 +153,7 @@ def _with_measured(soil: Soil, old: Soil) -> Soil:
 
 
 def _plain(soil: Soil) -> dict[str, Any]:
-    plain: dict[str, Any] = finite({"name": soil.name, **soil.to_dict()})
-    return plain
+    return finite({"name": soil.name, **soil.to_dict()})
 
 
 def _refitted(wanted: FitRequest, library: SoilLibrary, path: str) -> AdhesionCurve:
@@ -252,7 +250,4 @@ def _shown(name: str, studio: Studio, target: Path, by: Literal["pull", "slip"])
     slip, adhesion = (np.concatenate([getattr(part, key) for part in parts]) for key in ("slip", "adhesion"))
     step = max(len(slip) // SHOWN, 1)
     points = {"slip": slip[::step].round(5).tolist(), "adhesion": adhesion[::step].round(5).tolist()}
-    plain: dict[str, Any] = finite(
-        {**entry, "points": points, "count": len(slip), "bins": bins.to_list(), "note": note}
-    )
-    return plain
+    return finite({**entry, "points": points, "count": len(slip), "bins": bins.to_list(), "note": note})

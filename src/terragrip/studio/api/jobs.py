@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 
 from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT, method_named
+from terragrip.studio.folder import taken
 from terragrip.studio.job_store import Job
 from terragrip.studio.state import Here
 
@@ -130,7 +131,7 @@ async def add_batch(studio: Here, wanted: BatchRequest) -> dict[str, Any]:
             "is not a place for several files", file=wanted.output, hint="name a folder, new or there"
         )
     if folder.is_dir() and any(folder.iterdir()) and not wanted.replace:
-        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+        raise taken(wanted.output)
     logs = _files(studio, wanted.recordings)
     words = ["estimate", *logs, *options, "--output", _safe(wanted.output)]
     return studio.jobs.add("batch", _title(wanted.recordings, "logs"), wanted.output, words).to_dict()
@@ -195,11 +196,10 @@ def _queue(
 ) -> dict[str, Any]:
     """Queue one command over files; InputError on an output that cannot be written, or is an input."""
     files = _files(studio, inputs)
-    target = studio.folder.new_file(wanted.output, suffixes)
+    target = studio.folder.resolve(wanted.output)
     if any(target == (studio.folder.root / word).resolve() for word in (*files, *options)):
         raise InputError("is an input of this job", file=wanted.output, hint="choose another name")
-    if target.exists() and not wanted.replace:
-        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    studio.folder.new_file(wanted.output, suffixes, replace=wanted.replace)
     words = [kind, *files, *options, "--output", _safe(wanted.output)]
     noun = "logs" if kind == "calibrate" else "runs"
     return studio.jobs.add(kind, _title(inputs, noun), wanted.output, words).to_dict()

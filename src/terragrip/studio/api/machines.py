@@ -8,7 +8,6 @@ from typing import Any
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from terragrip.errors import InputError
 from terragrip.studio.api.files import Named, finite
 from terragrip.studio.state import Here
 from terragrip.vehicle_maker import SIGNALS, Made, classes, fields, interval_costs, make
@@ -57,7 +56,7 @@ def make_machine(wanted: Machine) -> dict[str, Any]:
     """What is asked for, with what is typical and from where (null: nothing is assumed); the vehicle for its sketch; the file as text."""
     made = wanted.make()
     asked = fields(made.machine, made.signals, made.known)
-    plain: dict[str, Any] = finite(
+    return finite(
         {
             "fields": [
                 {
@@ -78,27 +77,23 @@ def make_machine(wanted: Machine) -> dict[str, Any]:
             "text": made.to_yaml(),
         }
     )
-    return plain
 
 
 @router.post("/machines/costs")
 def costs_of_machine(wanted: Machine) -> list[dict[str, Any]]:
     """Half the width of the 95 % intervals where all is known, without each number that is not known, and as the file stands."""
-    plain: list[dict[str, Any]] = finite(
+    return finite(
         [
             {"what": cost.what, "field": cost.field, "half_width": cost.half_width}
             for cost in interval_costs(wanted.make())
         ]
     )
-    return plain
 
 
 @router.post("/machines/file", status_code=201)
 def save_machine(studio: Here, wanted: MachineFile) -> dict[str, str]:
     """Write the vehicle file; with the command line that makes it again."""
-    target = studio.folder.new_file(wanted.output, (".yaml", ".yml"))
-    if target.exists() and not wanted.replace:
-        raise InputError("exists already", file=wanted.output, hint="choose another name, or replace it")
+    target = studio.folder.new_file(wanted.output, (".yaml", ".yml"), replace=wanted.replace)
     wanted.make().save(target)
     words = ["terragrip", "new", "vehicle", "--class", wanted.machine, "--signals", wanted.signals]
     words += [f"--name={wanted.name.strip()}"] if wanted.name.strip() else []

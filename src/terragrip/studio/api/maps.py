@@ -22,15 +22,12 @@ TILE, WHOLE = 256, 1024
 its middle is a twentieth of a cell off at most."""
 WAY = 20_000
 """Points of the way that are sent."""
-BINARY = "application/octet-stream"
 Quantity = Annotated[str, Query(max_length=40)]
 
 
 def _map_of(studio: Studio, path: str, version: str = "") -> MapFile:
     """A map of the folder. Raises InputError where the file is none, or no longer the `version` that the page was given."""
-    if version and studio.folder.version(path) != version:
-        raise InputError("was replaced since it was opened", file=path, hint="open it again")
-    return studio.maps.get(studio.folder.file(path))
+    return studio.maps.get(studio.folder.file(path, version))
 
 
 @router.get("/map")
@@ -41,7 +38,7 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
     made = _map_of(studio, path)
     to_degrees = _Degrees(made.about.epsg)
     known = made.about
-    plain: dict[str, Any] = finite(
+    return finite(
         {
             "version": version,
             "cell": known.cell,
@@ -68,7 +65,6 @@ def about(studio: Here, path: Named) -> dict[str, Any]:
             ],
         }
     )
-    return plain
 
 
 @router.get("/map/cells")
@@ -98,23 +94,15 @@ def cells(studio: Here, path: Named, quantity: Quantity, version: str = "") -> R
     changes = made.changes(quantity)
     if changes:
         columns |= _beside(made, changes, rows)
-    whole = [np.issubdtype(values.dtype, np.integer) or values.dtype == bool for values in columns.values()]
+    sent = [
+        values.astype(np.int32 if values.dtype.kind in "iub" else np.float32) for values in columns.values()
+    ]
     head = {
         "columns": list(columns),
-        "types": ["int32" if one else "float32" for one in whole],
-        "count": len(rows),
+        "types": [values.dtype.name for values in sent],
         "soils": names.tolist(),
     }
-    return Response(
-        packed(
-            head,
-            [
-                v.astype(np.int32 if one else np.float32)
-                for v, one in zip(columns.values(), whole, strict=True)
-            ],
-        ),
-        media_type=BINARY,
-    )
+    return packed(head, sent)
 
 
 @router.get("/map/way")
@@ -128,7 +116,7 @@ def way(studio: Here, path: Named, version: str = "") -> Response:
     apart = np.flatnonzero((run[1:] != run[:-1]) | (np.diff(time) < 0) | (step > 10 * usual)) + 1
     head = {"columns": ["longitude", "latitude"], "of": made.points, "cut": len(run) < made.points}
     columns = [np.insert(values, apart, np.nan) for values in (longitude, latitude)]
-    return Response(packed({**head, "count": len(columns[0])}, columns), media_type=BINARY)
+    return packed(head, columns)
 
 
 class _Degrees:

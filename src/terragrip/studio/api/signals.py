@@ -15,7 +15,7 @@ from starlette.background import BackgroundTask
 
 from terragrip.errors import InputError
 from terragrip.estimation.export import KINDS
-from terragrip.studio.api.drive import BINARY, Time, recording_for, table_of
+from terragrip.studio.api.drive import Time, recording_for, table_of
 from terragrip.studio.api.files import Named
 from terragrip.studio.formulas import LONGEST
 from terragrip.studio.shown import FORMULA, Axis
@@ -65,11 +65,10 @@ def pairs(
     rows = known[:: -(-len(known) // PAIRS) or 1]
     head = {
         "columns": ["time", "x", "y"],
-        "count": len(rows),
         "cut": len(rows) < len(known),
         "of": len(known),
     }
-    return Response(packed(head, [time[rows], across[rows], up[rows]]), media_type=BINARY)
+    return packed(head, [time[rows], across[rows], up[rows]])
 
 
 @router.get("/drive/way")
@@ -78,8 +77,8 @@ def way(studio: Here, path: Named, axis: Axis, version: str = "") -> Response:
     table = table_of(studio, path, version)
     place = studio.shown.get(studio.folder.file(path)).along(axis)
     rows = np.unique(np.linspace(0, len(place) - 1, min(WAY, len(place))).astype(np.intp))
-    head = {"columns": ["time", axis], "count": len(rows), "cut": len(rows) < len(place)}
-    return Response(packed(head, [table.time[rows], place[rows]]), media_type=BINARY)
+    head = {"columns": ["time", axis], "cut": len(rows) < len(place)}
+    return packed(head, [table.time[rows], place[rows]])
 
 
 @router.get("/drive/kinds")
