@@ -11,7 +11,7 @@ _GROUPED = re.compile(rf"[+-]?[1-9]\d{{0,2}}(?P<sign>[{SIGNS}])\d{{3}}(?:(?P=sig
 
 _WITH_UNIT = re.compile(
     r"[+-]?\d+(?:[.,]\d+)?\s*(?P<unit>[kcm]?m/s(?:²|\^?2)?|km/h|kph|mph|kn|rpm|[1U]/min|rad(?:/s)?|deg(?:/s)?|°(?:/s)?|%|da?N|[kM]N|"
-    r"(?:k|da)?N[ ·]?m|kgf?|lbf?|bar|kW|m?A|m?s)",
+    r"(?:k|da)?N[ ·]?m|kgf?|lbf?|bar|kW|m?A|m?s|sec|min|hr)",
     re.IGNORECASE,
 )
 

@@ -12,11 +12,15 @@ _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d)(?:(?:[.,]|:(?=\d{
 _TIME = re.compile(_CLOCK)
 _SINCE = re.compile(rf"(?P<days>\d+) days?,? \+?{_CLOCK}")
 """Of pandas' and Python's time spans: 0 days 00:00:00.050000."""
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _NAMED = (
     re.compile(rf"(?P<day>\d{{1,2}})\.(?P<month>\d{{1,2}})\.(?P<year>(?:\d\d)?\d\d),?[ T]+{_CLOCK}"),
     re.compile(
-        rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+        rf"(?P<year>\d{{4}})[-/](?P<month>\d\d)[-/](?P<day>\d\d)[ T]+{_CLOCK}(?P<zone>Z| UTC|[+-]\d\d(?::?\d\d)?)?"
     ),
+    re.compile(
+        rf"(?P<day>\d\d)-(?P<month>(?i:{'|'.join(_MONTHS)}))-(?P<year>\d{{4}})[ T]+{_CLOCK}"
+    ),  # MATLAB's own
 )
 _EITHER = re.compile(
     rf"(?P<one>\d{{1,2}})(?P<sign>[/-])(?P<two>\d{{1,2}})(?P=sign)(?P<year>\d{{4}}),?[ T]+{_CLOCK}"
@@ -153,7 +157,7 @@ def _seconds(match: re.Match[str]) -> float:
 
 def _east(zone: str | None) -> int:
     """By how many seconds a zone's clock (``+02:00``) is ahead of UTC."""
-    if zone is None or zone == "Z":
+    if zone is None or zone in ("Z", " UTC"):
         return 0
     sign, digits = zone[0], zone[1:].replace(":", "")
     return int(f"{sign}1") * (3600 * int(digits[:2]) + 60 * int(digits[2:] or 0))
@@ -165,7 +169,8 @@ def _day(match: re.Match[str] | None, order: str | None) -> str:
     if "one" in match.re.groupindex:
         day, month = _pair(match) if order == ORDERS[0] else _pair(match)[::-1]
     else:
-        day, month = int(match["day"]), int(match["month"])
+        day, name = int(match["day"]), match["month"].title()
+        month = _MONTHS.index(name) + 1 if name in _MONTHS else int(name)
     century = "20" * (len(match["year"]) == 2)  # 13.4.24
     return f"{century}{match['year']}-{month:02d}-{day:02d}"
 

@@ -435,6 +435,38 @@ def test_dates_in_two_orders_are_refused(tmp_path: Path) -> None:
         read(dated(tmp_path / "log.csv", "time", "13/04/2024", "04/14/2024"))
 
 
+@pytest.mark.parametrize(
+    "row",
+    [
+        "03-Nov-2024 13:58:{:06.3f}",
+        "03-NOV-2024 01:58:{:06.3f} PM",
+        "2024-11-03 13:58:{:06.3f} UTC",
+        "{:.2f} sec",
+    ],
+)
+def test_times_as_matlab_and_databases_write_them(tmp_path: Path, row: str) -> None:
+    """'is not a number', of what MATLAB's writetable and writetimetable write by themselves."""
+    rows = "".join(f"{row.format(0.05 * k)},1,5\n" for k in range(40))
+    recording = read(put(tmp_path, f"time,ground_speed,wheel_speed_l\n{rows}"))
+    np.testing.assert_allclose(recording.time, 0.05 * np.arange(40), atol=1e-9)
+    if "2024" in row:
+        assert recording.start == datetime(2024, 11, 3, 13, 58, tzinfo=UTC).timestamp()
+
+
+def test_dates_in_digits_are_no_milliseconds(tmp_path: Path) -> None:
+    """'since 1970 in ms?' was advised, by which rows a second apart were a thousandth apart."""
+    rows = "".join(f"202411031358{k:02d},1,5\n" for k in range(40))
+    log = put(tmp_path, f"time,ground_speed,wheel_speed_l\n{rows}")
+    inspection = inspect(log)
+    assert any(
+        "time: is 20241103135800, a date and a time of day in digits" in w for w in inspection.warnings
+    )
+    (tmp_path / "p.yaml").write_text(inspection.profile)
+    for profile in (None, tmp_path / "p.yaml"):  # 59 would be followed by 100
+        with pytest.raises(InputError, match="time of day in digits; give seconds"):
+            read(log, profile)
+
+
 def test_half_days(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time,ground_speed,wheel_speed_l\n11:59:59 AM,1,5\n12:00:00 PM,1,5\n01:00:00 PM,1,5\n")

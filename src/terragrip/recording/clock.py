@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
@@ -41,5 +42,18 @@ def clock_text(when: float) -> str:
 
 
 def clock_unit(stamp: float) -> str | None:
-    """The unit of a stamp that counts from 1970 and is too large for seconds; None where seconds will do."""
+    """The unit of a stamp that counts from 1970 and is too large for seconds; None where seconds will do, or it is a date in digits."""
+    if is_date_in_digits(stamp):
+        return None
     return next((unit for least, unit in _UNITS if least < stamp < np.inf), None)
+
+
+def is_date_in_digits(stamp: float) -> bool:
+    """Whether a number is a date and a time of day as yyyymmddhhmmss, with milliseconds in three more digits or none."""
+    digits = f"{stamp:.0f}"
+    return (
+        re.fullmatch(
+            r"(19|20|21)\d\d(0[1-9]|1[0-2])([0-2]\d|3[01])([01]\d|2[0-3])([0-5]\d){2}(\d{3})?", digits
+        )
+        is not None
+    )

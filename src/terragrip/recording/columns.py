@@ -11,6 +11,7 @@ import numpy.typing as npt
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.recording.checks import place
+from terragrip.recording.clock import is_date_in_digits
 from terragrip.recording.schema import TIME
 from terragrip.thousands import complaint, has_thousands
 from terragrip.written_times import FORMS, doubt, misfit, times_of
@@ -75,9 +76,16 @@ def stamps_of(
 ) -> npt.NDArray[Any]:
     """A time column whose texts are times of day [s] or dates; others as they are. ``order`` as for `times_of`.
 
-    Raises InputError where dates do not show which number is the day.
+    Raises InputError where dates do not show which number is the day, or are numbers of digits.
     """
     if column.dtype.kind not in "OUT":
+        if (
+            column.dtype.kind in "fiu"
+            and len(column)
+            and all(map(is_date_in_digits, (column[0], column[-1])))
+        ):
+            problem = f"is {column[0]:.14g}, a date and a time of day in digits"
+            raise InputError(problem, file=source, place=f"column {name}", hint=FORMS)
         return column
     cells = [
         cell if isinstance(cell, str) else cell.isoformat() if isinstance(cell, dt.date | dt.time) else None
