@@ -1,6 +1,8 @@
-"""Text of any encoding as UTF-8, and what a file that is no text looks like."""
+"""Text of any encoding as UTF-8, what a file that is no text looks like, and tables as text."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from terragrip.errors import InputError
 
@@ -87,3 +89,9 @@ def in_utf8(data: bytes) -> bytes:
 
 def _binary(source: str) -> InputError:
     return InputError("is not a table of text", file=source, hint="give a CSV or Parquet file")
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines, each column as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

@@ -308,17 +308,11 @@ def _field_work(work: Work, vehicle: Vehicle) -> dict[str, float]:
         "hectares_per_hour_at_best": best_speed * vehicle.working_width * 0.36,
     }
     if vehicle.fuel is not None:
-        for name, pull, eta in (
-            ("litres_per_hectare", float(np.mean(work.pull)), float(work.efficiency[0])),
-            ("litres_per_hectare_same_pull_at_best", float(np.mean(work.pull)), work.best.efficiency),
+        force = max(float(np.mean(work.pull)), 0.0) * vehicle.mass * STANDARD_GRAVITY
+        for name, eta in (
+            ("litres_per_hectare", float(work.efficiency[0])),
+            ("litres_per_hectare_same_pull_at_best", work.best.efficiency),
         ):
-            energy = (
-                max(pull, 0.0)
-                * vehicle.mass
-                * STANDARD_GRAVITY
-                * 1e4
-                / vehicle.working_width
-                / max(eta, 1e-3)
-            )
+            energy = force * 1e4 / vehicle.working_width / max(eta, 1e-3)
             out[name] = energy * vehicle.fuel * 1e3
     return out

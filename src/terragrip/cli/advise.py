@@ -7,16 +7,14 @@ from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import Quiet, VehicleFile
+from terragrip.cli.options import EstimatesFiles, Quiet, VehicleFile
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.note_pages import doubts_of, with_page
 
 
 def command(
-    estimates: Annotated[
-        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
-    ],
+    estimates: EstimatesFiles,
     vehicle: VehicleFile,
     soils: Annotated[
         Path | None,
@@ -42,8 +40,7 @@ def command(
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
-    inputs = [*estimates, vehicle, *([soils] if soils else [])]
-    target = check_file(output, inputs, suffixes=(".json",)) if output else None
+    target = check_file(output, [*estimates, vehicle, soils], suffixes=(".json",)) if output else None
     machine = Vehicle.load(vehicle)
     library = SoilLibrary.load(soils) if soils else None
     tables = []

@@ -43,9 +43,7 @@ def command(
     from terragrip.vehicle import Vehicle
 
     machine = Vehicle.load(vehicle)
-    check_file(
-        output, [*logs, vehicle, *([profile] if profile else []), *(dbc or [])], suffixes=(".yaml", ".yml")
-    )
+    check_file(output, [*logs, vehicle, profile, *(dbc or [])], suffixes=(".yaml", ".yml"))
     spans = _spans(light or [], len(logs))
     recordings = []
     with progress("reading", quiet) as step:

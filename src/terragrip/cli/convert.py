@@ -7,16 +7,14 @@ from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import Quiet
+from terragrip.cli.options import EstimatesFile, Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.estimation.export import KINDS, require_suffix
 
 
 def command(
-    estimates: Annotated[
-        Path, typer.Argument(metavar="ESTIMATES", help="A Parquet file written by 'terragrip estimate'.")
-    ],
+    estimates: EstimatesFile,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help=f"The file: {', '.join(KINDS)}.")
     ],

@@ -9,12 +9,12 @@ from typing import Annotated
 import typer
 
 from terragrip.cli.drives import Drive, drives_in, drives_of
-from terragrip.cli.options import DbcFiles, OtherSources, ProfileFiles, Quiet, VehicleFile
+from terragrip.cli.options import DbcFiles, Method, OtherSources, ProfileFiles, Quiet, VehicleFile
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
 from terragrip.estimation.export import KINDS, require_suffix
-from terragrip.estimation.methods import DEFAULT, METHODS
+from terragrip.estimation.methods import DEFAULT
 
 
 def command(
@@ -45,7 +45,7 @@ def command(
             help="In place of LOG: a CSV with the columns log, profile, drive; logs of one drive are joined.",
         ),
     ] = None,
-    method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
+    method: Method = DEFAULT,
     smooth: Annotated[bool, typer.Option("--smooth", help="Also smooth the whole log backwards.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -69,9 +69,7 @@ def command(
         not (log.is_file() or (log.is_dir() and is_bag(log))) for log in logs or []
     )
     into_folder = len(drives) > 1 or (listed and output.suffix.lower() not in KINDS)
-    targets = _targets(
-        drives, output, into_folder, [vehicle, *used, *(dbc or []), *([table] if table else [])]
-    )
+    targets = _targets(drives, output, into_folder, [vehicle, *used, *(dbc or []), table])
 
     def estimated(drive: Drive, target: Path, title: str) -> str:
         with progress(title, quiet) as step:
@@ -156,7 +154,7 @@ def _one_by_one(
         )
 
 
-def _targets(drives: list[Drive], output: Path, into_folder: bool, beside: list[Path]) -> list[Path]:
+def _targets(drives: list[Drive], output: Path, into_folder: bool, beside: list[Path | None]) -> list[Path]:
     """The file of each drive's estimates, tried before the long work; ``beside`` are the other inputs."""
     logs = [log for drive in drives for log in drive.logs]
     inputs = [*logs, *beside]

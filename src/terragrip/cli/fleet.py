@@ -9,11 +9,11 @@ import typer
 
 from terragrip.cli.drives import logs_in
 from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
-from terragrip.cli.options import DbcFiles, ProfileFile, Quiet
+from terragrip.cli.options import DbcFiles, Method, ProfileFile, Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
-from terragrip.estimation.methods import DEFAULT, METHODS
+from terragrip.estimation.methods import DEFAULT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +50,7 @@ def command(
         ),
     ] = None,
     dbc: DbcFiles = None,
-    method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
+    method: Method = DEFAULT,
     smooth: Annotated[bool, typer.Option("--smooth", help="Also smooth each log backwards.")] = False,
     scheduler: Annotated[
         str | None,
@@ -192,20 +192,14 @@ def _quantiles(values: Sequence[float]) -> list[tuple[dict[str, str], float]]:
 
 def _lines(done: FleetResult, output: str) -> list[str]:
     lines = [f"Logs: {done.estimated} estimated, {done.unchanged} unchanged, {len(done.failed)} failed."]
-    lines += [f"  {log}: {reason}" for log, reason in list(done.failed.items())[:10]]
-    if len(done.failed) > 10:
-        lines.append(f"  and {len(done.failed) - 10} more in failures.parquet")
-    lines += [
-        f"  {log}: left out of means and curves: {why}" for log, why in list(done.left_out.items())[:10]
-    ]
-    if len(done.left_out) > 10:
-        lines.append(f"  and {len(done.left_out) - 10} more left out, in summary.parquet")
-    lines += [
-        f"  {name} is unlike the other vehicles: {means}; other ground or work, or its vehicle file is wrong"
-        for name, means in list(done.unlike.items())[:10]
-    ]
-    if len(done.unlike) > 10:
-        lines.append(f"  and {len(done.unlike) - 10} more unlike the others, in the report")
+    odd = "{} is unlike the other vehicles: {}; other ground or work, or its vehicle file is wrong"
+    for said, listed, rest in (
+        ("{}: {}", done.failed, "in failures.parquet"),
+        ("{}: left out of means and curves: {}", done.left_out, "left out, in summary.parquet"),
+        (odd, done.unlike, "unlike the others, in the report"),
+    ):
+        lines += [f"  {said.format(*one)}" for one in list(listed.items())[:10]]
+        lines += [f"  and {len(listed) - 10} more {rest}"] * (len(listed) > 10)
     if done.kept:
         kept = "1 log of earlier calls is" if done.kept == 1 else f"{done.kept} logs of earlier calls are"
         lines.append(f"{kept} kept.")

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from terragrip.cli.options import Quiet
+from terragrip.cli.options import EstimatesFiles, Quiet
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError, suggestion
 from terragrip.note_pages import with_page
+from terragrip.text import aligned
 
 if TYPE_CHECKING:
     from terragrip.ground.result import Ground
 
 
 def command(
-    estimates: Annotated[
-        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
-    ],
+    estimates: EstimatesFiles,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The result, ground.json.")],
     library: Annotated[
         Path | None,
@@ -63,7 +62,7 @@ def command(
     if not 0 < length < float("inf"):
         raise InputError(f"{length:g} is not a length", place="--length", hint="give metres, e.g. 30")
     runs = _names(estimates)
-    inputs = [*estimates, *([library] if library else [])]
+    inputs = [*estimates, library]
     target = check_file(output, inputs, suffixes=(".json",))
     tables = _tables(table, estimates, [*inputs, output])
     known = SoilLibrary.load(library) if library else None
@@ -115,7 +114,7 @@ def _names(files: list[Path]) -> list[str]:
     return list(seen)
 
 
-def _tables(table: Path | None, estimates: list[Path], inputs: list[Path]) -> list[Path]:
+def _tables(table: Path | None, estimates: list[Path], inputs: list[Path | None]) -> list[Path]:
     if table is None:
         return []
     if len(estimates) == 1:
@@ -154,5 +153,4 @@ def _sections(ground: Ground) -> list[str]:
         chance = f"{one.probabilities[one.soil]:.2f}"
         start, end = clock.text(one.start, 1), clock.text(one.end, 1)
         rows.append((f"  {start}", end, one.soil, chance, slip, adhesion))
-    widths = [max(len(row[i]) for row in rows) for i in range(6)]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return aligned(rows)

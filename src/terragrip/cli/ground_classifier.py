@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from terragrip.cli.options import DbcFiles, OtherSources, ProfileFile, Quiet
+from terragrip.cli.options import DbcFiles, Logs, OtherSources, ProfileFile, Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.errors import InputError
@@ -58,8 +58,7 @@ def train(
     """
     from terragrip.ground.classification.classifier import GroundClassifier
 
-    beside = [path for path in (labels, profile, *(dbc or ())) if path is not None]
-    target = check_file(output, [*(logs or ()), *beside], suffixes=(".npz",))
+    target = check_file(output, [*(logs or ()), labels, profile, *(dbc or ())], suffixes=(".npz",))
     classifier = GroundClassifier(window, random_state=seed)
     classifier.check_parameters()
     tables, grounds, sources = _labelled(logs or [], labels, column, profile, dbc or [], window, quiet)
@@ -81,9 +80,7 @@ def train(
 
 @app.command("predict")
 def predict(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md).")
-    ],
+    logs: Logs,
     classifier: Annotated[
         Path, typer.Option("--classifier", "-c", metavar="FILE", help="What 'train' wrote, grounds.npz.")
     ],
@@ -119,7 +116,7 @@ def predict(
 
     if others and len(logs) > 1:
         raise InputError("there are several logs", place="--with", hint="predict one drive at a time")
-    beside = [path for path in (classifier, profile, *(dbc or ()), *(others or ())) if path is not None]
+    beside = [classifier, profile, *(dbc or ()), *(others or ())]
     target = check_file(output, [*logs, *beside], suffixes=(".csv", ".parquet"))
     known = GroundClassifier.load(classifier)
     known.set_params(step=step, smooth=smooth)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from terragrip.cli.log import LogForm, LogFormat, log_to_stderr
-from terragrip.cli.options import Quiet
+from terragrip.cli.options import Method, Quiet
 from terragrip.errors import InputError
-from terragrip.estimation.methods import DEFAULT, METHODS
+from terragrip.estimation.methods import DEFAULT
 
 if TYPE_CHECKING:
     import asyncio
@@ -51,7 +51,7 @@ def command(
             "--record", metavar="DIR", help="Keep all inputs and outputs; continues where it stopped."
         ),
     ] = None,
-    method: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")] = DEFAULT,
+    method: Method = DEFAULT,
     window: Annotated[
         float,
         typer.Option(metavar="MS", min=0.0, max=10_000.0, help="How long a row waits for late samples, ms."),

@@ -76,7 +76,7 @@ def command(
     from terragrip.soil.estimates import distinct
     from terragrip.soil.library import SoilLibrary
 
-    target = check_file(output, [*inputs, *(path for path in (soils, ground) if path)])
+    target = check_file(output, [*inputs, soils, ground])
     require_suffix(target)
     for value, name, least, most in (
         (cell, "--cell", 0.05, 1000.0),

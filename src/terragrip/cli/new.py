@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from terragrip.cli.options import Quiet
+from terragrip.cli.options import EstimatesFile, Quiet
 from terragrip.cli.output import check_file
 from terragrip.errors import InputError
 from terragrip.files import replacing
@@ -180,9 +180,7 @@ def vehicle(
 
 @app.command("controller")
 def controller(
-    estimates: Annotated[
-        Path, typer.Argument(metavar="ESTIMATES", help="A Parquet file written by 'terragrip estimate'.")
-    ],
+    estimates: EstimatesFile,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The new header (.h).")],
     quiet: Quiet = False,
 ) -> None:

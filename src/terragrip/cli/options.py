@@ -7,9 +7,18 @@ from typing import Annotated
 
 import typer
 
+from terragrip.estimation.methods import METHODS
+
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG", help="Logs of any known format (docs/formats.md).")
 ]
+EstimatesFile = Annotated[
+    Path, typer.Argument(metavar="ESTIMATES", help="A Parquet file written by 'terragrip estimate'.")
+]
+EstimatesFiles = Annotated[
+    list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
+]
+Method = Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(METHODS)}.")]
 VehicleFile = Annotated[Path, typer.Option("--vehicle", metavar="FILE", help="The vehicle file (YAML).")]
 ProfileFiles = Annotated[
     list[Path] | None,

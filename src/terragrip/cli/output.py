@@ -11,9 +11,13 @@ from terragrip.errors import InputError
 
 
 def check_file(
-    path: Path, inputs: Iterable[Path] = (), *, suffixes: tuple[str, ...] = (), option: str = "--output"
+    path: Path,
+    inputs: Iterable[Path | None] = (),
+    *,
+    suffixes: tuple[str, ...] = (),
+    option: str = "--output",
 ) -> Path:
-    """A file that can be written, not one of the inputs, in a folder that exists.
+    """A file that can be written, not one of the inputs (as far as given), in a folder that exists.
 
     Raises
     ------
@@ -84,9 +88,9 @@ def files_in(folder: Path, logs: Iterable[Path], suffix: str) -> list[Path]:
     return list(seen)
 
 
-def _refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
+def _refuse_inputs(path: Path, inputs: Iterable[Path | None]) -> None:
     for source in inputs:
-        if path.exists() and source.exists() and path.samefile(source):
+        if source is not None and path.exists() and source.exists() and path.samefile(source):
             raise InputError("is an input too", file=path, place="--output", hint="choose another name")
 
 

@@ -7,15 +7,13 @@ from typing import Annotated
 
 import typer
 
-from terragrip.cli.options import Quiet
+from terragrip.cli.options import EstimatesFiles, Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 
 
 def command(
-    estimates: Annotated[
-        list[Path], typer.Argument(metavar="ESTIMATES", help="Files written by 'terragrip estimate'.")
-    ],
+    estimates: EstimatesFiles,
     output: Annotated[
         Path,
         typer.Option(
@@ -52,7 +50,7 @@ def command(
     from terragrip.report.pdf import EXTRA, pdf_possible, write_pdf
     from terragrip.soil.library import SoilLibrary
 
-    inputs = [*estimates, *(path for path in (library, ground) if path)]
+    inputs = [*estimates, library, ground]
     target = check_file(output, inputs, suffixes=(".html", ".htm"))
     printed = None
     if not no_pdf:

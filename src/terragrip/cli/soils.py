@@ -12,6 +12,7 @@ from terragrip.cli.options import Quiet
 from terragrip.cli.output import check_file
 from terragrip.cli.progress import progress
 from terragrip.note_pages import with_page
+from terragrip.text import aligned
 
 if TYPE_CHECKING:
     from terragrip.soil.fit import AdhesionCurve
@@ -84,7 +85,7 @@ def command(
     from terragrip.soil.library import SoilLibrary
     from terragrip.soil.literature import literature_soils
 
-    target = check_file(output, [*inputs, *(path for path in (merge, compare) if path)], suffixes=(".json",))
+    target = check_file(output, [*inputs, merge, compare], suffixes=(".json",))
     base = SoilLibrary.load(merge) if merge else None
     other = SoilLibrary.load(compare) if compare else None
     try:
@@ -236,10 +237,7 @@ def table(library: Mapping[str, Soil]) -> str:
         fixed = "" if not badge else Identifiability.from_dict(badge).short(one.r2)
         bins = f"{len(one.bins)} by {settings.get('by', 'slip')}" if one.bins else ""
         rows.append((name, one.model, ", ".join(words), *score, bins, _by_slip(one), fixed))
-    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )
+    return "\n".join(aligned(rows))
 
 
 def _by_slip(soil: Soil) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from terragrip.note_pages import with_page
 from terragrip.recording.schema import wheel_names_in
+from terragrip.text import aligned
 
 if TYPE_CHECKING:
     from terragrip.formats.channel_proposal import Proposal
@@ -20,7 +21,7 @@ def text_of(inspection: Inspection) -> str:
     parts = [f"{inspection.file}: {inspection.rows} rows, {len(inspection.columns)} columns"]
     if inspection.time is not None:
         parts.append(_time_text(inspection.time))
-    parts.append(_table([_HEAD, *(_row(column) for column in inspection.columns)]))
+    parts.append("\n".join(aligned([_HEAD, *(_row(column) for column in inspection.columns)])))
     if inspection.recognised:
         result = [_proposal_text(channel, own) for channel, own in inspection.proposals.items()]
         parts.append("Recognised, with confidence and evidence\n" + "\n".join(result))
@@ -66,7 +67,7 @@ def summary_of(inspections: Sequence[Inspection]) -> str:
         length = "" if one.time is None else _number(one.time.duration)
         rows.append((one.file, str(one.rows), length, wheels, ground, torque, state))
         layouts.setdefault(tuple(column.name for column in one.columns), []).append(one)
-    parts = [_table(rows)]
+    parts = ["\n".join(aligned(rows))]
     for alike in layouts.values():
         first = alike[0]
         others = f" and {len(alike) - 1} more with the same columns" if len(alike) > 1 else ""
@@ -121,10 +122,3 @@ def _row(column: ColumnSummary) -> tuple[str, ...]:
 
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
-
-
-def _table(rows: list[tuple[str, ...]]) -> str:
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    )

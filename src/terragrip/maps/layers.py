@@ -78,30 +78,20 @@ def _points(made: FieldMap) -> geopandas.GeoDataFrame:
 def _anomalies(made: FieldMap) -> geopandas.GeoDataFrame:
     import shapely
 
-    rows: list[dict[str, Any]] = []
+    names = (
+        "quantity", "kind", "value", "around", "difference", "difference_std", "p", "area", "east", "north",
+    )  # fmt: skip
+    rows: list[tuple[Any, ...]] = []
     shapes = []
     for quantity, found in made.anomalies.items():
         cells: Cells = made.cells[quantity]
         for one in found:
-            rows.append({
-                "quantity": quantity, "kind": _kind(quantity, one.difference), "value": one.value, "around": one.around,
-                "difference": one.difference, "difference_std": one.std, "p": one.p, "area": len(one.cells) * made.cell**2,
-                "east": one.column * made.cell, "north": one.row * made.cell,
-            })  # fmt: skip
+            rows.append((
+                quantity, _kind(quantity, one.difference), one.value, one.around, one.difference, one.std, one.p,
+                len(one.cells) * made.cell**2, one.column * made.cell, one.row * made.cell,
+            ))  # fmt: skip
             shapes.append(shapely.union_all(_boxes(made, cells.column[one.cells], cells.row[one.cells])))
-    names = (
-        "quantity",
-        "kind",
-        "value",
-        "around",
-        "difference",
-        "difference_std",
-        "p",
-        "area",
-        "east",
-        "north",
-    )
-    return _frame({name: np.array([row[name] for row in rows]) for name in names}, shapes, made)
+    return _frame({name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}, shapes, made)
 
 
 def _kind(quantity: str, difference: float) -> str:

@@ -5,6 +5,7 @@ Two other signals of motion judge this: the speed over ground, and turns from th
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +35,7 @@ MIRRORED = -0.6
 def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None) -> None:
     """Raise InputError if positions contradict the motion, with the likely mistake. ``fixes``: rows with a fresh position."""
     latitude, longitude = estimates["latitude"][fixes], estimates["longitude"][fixes]
-    place = "columns latitude, longitude"
+    refused = partial(InputError, file=file, place="columns latitude, longitude")
     for name, values, most in (("latitude", latitude, 90), ("longitude", longitude, 360)):
         beyond = np.abs(values) > most + 1e-4
         if not beyond.any():
@@ -49,12 +50,7 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
             )
         else:
             fix = "they look like metres of a grid: give degrees"
-        raise InputError(
-            f"{name}s reach {np.abs(values).max():.6g}, beyond {most} degrees",
-            file=file,
-            place=place,
-            hint=fix,
-        )
+        raise refused(f"{name}s reach {np.abs(values).max():.6g}, beyond {most} degrees", hint=fix)
     way = np.maximum.accumulate(np.nan_to_num(estimates["distance"]))[fixes]
     ends = _stretches(way)
     if len(ends) < LEAST + 1:
@@ -62,10 +58,8 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
     driven = np.diff(way[ends])
     given = _apart(latitude, longitude, ends, driven)
     if np.abs(longitude).max() <= 90 and _only_swapped_fits(latitude, longitude, ends, driven):
-        raise InputError(
+        raise refused(
             "positions move too far in one direction and not in the other, against the wheels and the ground speed",
-            file=file,
-            place=place,
             hint="latitude and longitude look swapped: correct the profile",
         )
     if given > APART:
@@ -76,25 +70,19 @@ def refuse_impossible(estimates: Estimates, fixes: Ints, file: str | None = None
         }
         for what, (north, east) in others.items():
             if np.abs(north).max() <= 90 and _apart(north, east, ends, driven) < ALIKE:
-                raise InputError(
+                raise refused(
                     f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
-                    file=file,
-                    place=place,
                     hint=f"latitude and longitude look {what}: correct the profile",
                 )
     if given > NEVER:
-        raise InputError(
+        raise refused(
             f"positions move {np.exp(given):.3g} times as far as the wheels and the ground speed, or as little",
-            file=file,
-            place=place,
             hint="check the units of latitude, longitude and ground_speed in the profile, and at the positions' resolution",
         )
     turning = _wheel_turns(estimates, fixes, ends)
     if turning is not None and _mirrored(latitude, longitude, ends, turning):
-        raise InputError(
+        raise refused(
             "the track turns left where the wheels turn right",
-            file=file,
-            place=place,
             hint="a sign of latitude or longitude is lost (west and south are negative), or they are swapped: correct the profile",
         )
 

@@ -25,46 +25,12 @@ MASSES = (0.2, 10.0)
 _ROUNDED = 0.2  # of the stamps repeat the one before: no slip of a logger, but all of its stamps
 _HOUR, _ROUGHLY = 3600.0, 30.0  # s
 _OF_NAMES = (
-    *(
-        "signal",
-        "signalname",
-        "channel",
-        "channelname",
-        "topic",
-        "parameter",
-        "variable",
-        "series",
-        "sensor",
-        "metric",
-        "tag",
-    ),
-    *(
-        "field",
-        "measurement",
-        "key",
-        "name",
-        "kanal",
-        "kanalname",
-        "messgröße",
-        "messgroesse",
-        "grandeur",
-        "señal",
-        "segnale",
-    ),
-)
+    "signal", "signalname", "channel", "channelname", "topic", "parameter", "variable", "series", "sensor", "metric", "tag",
+    "field", "measurement", "key", "name", "kanal", "kanalname", "messgröße", "messgroesse", "grandeur", "señal", "segnale",
+)  # fmt: skip
 _OF_VALUES = (
-    "value",
-    "values",
-    "val",
-    "physicalvalue",
-    "wert",
-    "messwert",
-    "valeur",
-    "valor",
-    "valore",
-    "waarde",
-    "reading",
-)
+    "value", "values", "val", "physicalvalue", "wert", "messwert", "valeur", "valor", "valore", "waarde", "reading",
+)  # fmt: skip
 _NARROW = 6  # columns: time, unit, source and so on may be beside these two
 _OF_ESTIMATES = {"ground_speed", "ground_speed_std", "distance", "event"}
 _ESSENTIAL = ("wheel_speed_", "wheel_based_speed", "drive_torque_", "ground_speed", "drawbar_force")

@@ -205,14 +205,7 @@ def _spots_and_driver(machine: Any, scenario: Scenario, axles: int) -> None:
     driver, out = scenario.driver, machine.driver
     out.enabled = int(driver.acts)
     for name in (
-        "stuck_ratio",
-        "patience",
-        "boost",
-        "boost_time",
-        "ease",
-        "ease_time",
-        "free_ratio",
-        "free_time",
-    ):
+        "stuck_ratio", "patience", "boost", "boost_time", "ease", "ease_time", "free_ratio", "free_time",
+    ):  # fmt: skip
         setattr(out, name, getattr(driver, name))
     out.assist_rate, out.assist_limit = driver.push_rate, driver.push_limit

@@ -133,14 +133,10 @@ def one_table(series: list[Series]) -> tuple[Floats, dict[str, Floats]]:
 def true_parameters(vehicle: Vehicle, errors: Errors, radius: Floats) -> dict[str, Any]:
     """A result's values of its machine: gains, offsets, radii (wheels,) and the calibration that would correct them."""
     wheels = vehicle.wheels
-    torque = [f"drive_torque_{wheel}" for wheel in wheels]
+    torque = {w: c for w in wheels if (c := f"drive_torque_{w}") in errors.gain}
     calibration: dict[str, Any] = {
-        "drive_torque_gain": {
-            w: errors.gain[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain
-        },
-        "drive_torque_offset": {
-            w: errors.offset[c] for w, c in zip(wheels, torque, strict=True) if c in errors.gain
-        },
+        "drive_torque_gain": {w: errors.gain[c] for w, c in torque.items()},
+        "drive_torque_offset": {w: errors.offset[c] for w, c in torque.items()},
         "drawbar_offset": errors.offset.get("drawbar_force", 0.0),
         "acceleration_bias_x": errors.offset.get("acceleration_x", 0.0),
         "pitch_offset": errors.offset.get("pitch", 0.0),

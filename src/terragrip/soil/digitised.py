@@ -174,13 +174,8 @@ def soils_of_points(
         inside = one.slip[(one.slip >= template.bins.lower) & (one.slip < template.bins.upper)]
         steps = np.diff(np.unique(inside))
         width = max(float(steps.min()) / 2, 1e-5) if steps.size else template.bins.width
-        fitted = AdhesionCurve(
-            template.model,
-            template.fixed,
-            template.intercept,
-            bins=BinSettings(width, template.bins.lower, template.bins.upper, 1),
-            bootstrap=0,
-        )
+        bins = BinSettings(width, template.bins.lower, template.bins.upper, 1)
+        fitted = template.unfitted(bins=bins, bootstrap=0)
         try:
             soils[one.name] = Soil.from_curve(
                 one.name,

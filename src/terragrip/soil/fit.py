@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -345,22 +346,7 @@ class AdhesionCurve:
 
     def unfitted(self, **changes: Any) -> AdhesionCurve:
         """The same curve, unfitted; `changes` are arguments of the constructor."""
-        same = {
-            name: getattr(self, name)
-            for name in (
-                "model",
-                "fixed",
-                "intercept",
-                "weights",
-                "bins",
-                "bootstrap",
-                "seed",
-                "common_sd",
-                "bounds",
-                "common_slip_sd",
-                "start",
-            )
-        }
+        same = {name: getattr(self, name) for name in signature(AdhesionCurve).parameters}
         return AdhesionCurve(**{**same, **changes})
 
 

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -297,18 +297,7 @@ def soil_of(name: str, entry: Any, file: str, under: str = "soils") -> Soil:
             _number(row.get(key), file, f"{place}.bins[{i}].{key}")
     _refuse_bad_fit(entry, values, file, place)
     resistance = entry.get("resistance")
-    known = {
-        "model",
-        "parameters",
-        "interval",
-        "r2",
-        "nrmse",
-        "bins",
-        "reach",
-        "resistance",
-        "spread",
-        "source",
-    }
+    known = {one.name for one in fields(Soil)} | {"reach"}
     return Soil(
         name=name,
         model=model,

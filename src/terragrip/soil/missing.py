@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from terragrip.soil.bins import Bins, BinSettings
+from terragrip.soil.bins import Bins
 from terragrip.soil.library import Soil
 
 _STEADY = 0.1
@@ -32,12 +31,8 @@ class Gap:
 
 def missing_slips(bins: Bins) -> list[tuple[float, float]]:
     """Stretches (low, high) of slip whose bins have too few samples, neighbours joined."""
-    return _stretches(bins.settings, bins.used)
-
-
-def _stretches(settings: BinSettings, used: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    edges = settings.edges
-    lacking = np.concatenate(([False], ~used, [False]))
+    edges = bins.settings.edges
+    lacking = np.concatenate(([False], ~bins.used, [False]))
     starts = np.flatnonzero(lacking[1:] & ~lacking[:-1])
     ends = np.flatnonzero(~lacking[1:] & lacking[:-1])
     return [(float(edges[a]), float(edges[b])) for a, b in zip(starts, ends, strict=True)]

@@ -12,6 +12,7 @@ import numpy as np
 
 from terragrip.document import read_yaml
 from terragrip.errors import InputError, suggestion
+from terragrip.physics.loads import GRAVITY
 
 _LONE = 0.3  # relative SD where one machine alone says what is typical (ours)
 _LEAST = 0.05  # relative SD that a handful of machines cannot show a smaller one than (ours)
@@ -65,7 +66,7 @@ class MachineClass:
             value = own["per_cube_root"] * float(np.cbrt(mass))
             return Typical(value, own["spread"] * value, own["source"])
         wheels = sum(len(axle["wheels"]) for axle in self.axles.values())
-        load = mass * 9.80665 / wheels
+        load = mass * GRAVITY / wheels
         if name == "wheel_inertia":
             return _relative(own, mass / wheels * float(radius or 0) ** 2)
         if name == "bearing_resistance":
@@ -73,7 +74,7 @@ class MachineClass:
         if name == "drive_torque_offset":
             return Typical(own["value"] * load * float(radius or 0), 0.0, own["source"])
         if name in ("drawbar_offset", "drawbar_force"):
-            return Typical(own["value"] * mass * 9.80665, 0.0, own["source"])
+            return Typical(own["value"] * mass * GRAVITY, 0.0, own["source"])
         return Typical(own["value"], own.get("spread", 0.0), own["source"])
 
     def _by_machines(self, name: str, machines: list[str], mass: float, radius: float | None) -> Typical:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.consistency import NORMAL_95
+from terragrip.text import aligned
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_parts import Calibration as CalibrationBlock
 
@@ -156,10 +157,7 @@ class Calibration:
         """The quantities with their intervals and evidence, and what could not be determined, as plain text."""
         rows = [("quantity", "value", "95 % interval", "unit", "from")]
         rows += [_row(quantity) for quantity in self.quantities]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows
-        ]
+        lines = aligned(rows)
         sentences = dict.fromkeys((quantity.key, quantity.sentence) for quantity in self.quantities)
         lines += ["", *(f"{key}: {sentence}" for key, sentence in sentences)] if sentences else []
         lines += ["", "Not determined by the data:"] if self.unknown else []
