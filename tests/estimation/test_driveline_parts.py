@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rear_tractor import G, tractor
 from terragrip.errors import InputError
 from terragrip.estimation.driveline import DrivenMachine, _by_efficiency, by_engine, lumped
 from terragrip.estimation.engine_torque import (
@@ -21,30 +22,6 @@ from terragrip.physics.efficiency import tractive_efficiency
 from terragrip.recording.schema import has_engine_torque
 from terragrip.vehicle import Vehicle
 from terragrip.vehicle_parts import Driveline
-
-G = 9.80665
-
-
-def tractor(**more: Any) -> Vehicle:
-    """Rear driven; rear wheels of .8 and .9 m, front of .5 m."""
-    axles = {
-        "front": {
-            "mass": 2500,
-            "wheels": ["fl", "fr"],
-            "driven": False,
-            "wheel": {"radius": 0.5, "inertia": 10},
-        },
-        "rear": {"mass": 3500, "wheels": ["rl", "rr"], "wheel": {"radius": 0.8, "inertia": 50}},
-    }
-    base = {
-        "mass": 6000,
-        "wheelbase": 2.8,
-        "track": 1.6,
-        "center_of_gravity_height": 1.0,
-        "hitch_height": 0.5,
-        "axles": axles,
-    }
-    return Vehicle.from_dict({**base, **more})
 
 
 def gears(**more: float) -> Driveline:

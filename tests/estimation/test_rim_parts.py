@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 import terragrip as tg
+from rear_tractor import G, tractor
 from terragrip._kernel import lib
 from terragrip.errors import InputError
 from terragrip.estimation.noise import channel_noise, sensor_of
@@ -33,31 +33,6 @@ from terragrip.estimation.slip_only import (
 from terragrip.estimation.zero_slip import REMEDY, Zero
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
-
-G = 9.80665
-
-
-def tractor(**more: Any) -> Vehicle:
-    """Rear driven; rear wheels of .8 and .9 m, front of .5 m."""
-    axles = {
-        "front": {
-            "mass": 2500,
-            "wheels": ["fl", "fr"],
-            "driven": False,
-            "wheel": {"radius": 0.5, "inertia": 10},
-        },
-        "rear": {"mass": 3500, "wheels": ["rl", "rr"], "wheel": {"radius": 0.8, "inertia": 50}},
-    }
-    base = {
-        "mass": 6000,
-        "wheelbase": 2.8,
-        "track": 1.6,
-        "center_of_gravity_height": 1.0,
-        "hitch_height": 0.5,
-        "axles": axles,
-    }
-    return Vehicle.from_dict({**base, **more})
-
 
 TIME = np.arange(0.0, 60.0, 0.5)
 

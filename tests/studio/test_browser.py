@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -198,28 +199,27 @@ def pixel(slip: float, adhesion: float) -> tuple[float, float]:
     return float(80 + c * x - s * y), float(440 + s * x + c * y)
 
 
+def mark_axes(page: Any, points: tuple[tuple[float, float], ...], values: tuple[float, ...]) -> None:
+    """Click two points of each axis in the picture, give their values, and use them."""
+    box = page.wait_for_selector("dialog .sheet").bounding_box()
+    scale = box["width"] / 800
+    for point in points:
+        x, y = pixel(*point)
+        page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
+    for place, value in zip(product(("Slip", "Adhesion"), (1, 2)), values, strict=True):
+        field = page.locator("input[aria-label='{} axis, point {}, value']".format(*place))
+        field.fill(str(value))
+        field.press("Tab")
+    page.click("text=Use these axes")
+
+
 def test_a_turned_picture_is_calibrated_to_half_a_per_cent_of_the_axis(
     page: Any, served: Served, folder: Path
 ) -> None:
     diagram(folder)
     open_fit(page, served)
     page.select_option("select[aria-label='Open a picture from the folder']", "scan.png")
-    sheet = page.wait_for_selector("dialog .sheet")
-    box = sheet.bounding_box()
-    scale = box["width"] / 800
-    for point in ((0.1, 0.0), (0.9, 0.0), (0.0, 0.1), (0.0, 0.9)):
-        x, y = pixel(*point)
-        page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
-    for name, value in (
-        ("Slip axis, point 1", 10),
-        ("Slip axis, point 2", 90),
-        ("Adhesion axis, point 1", 0.1),
-        ("Adhesion axis, point 2", 0.9),
-    ):
-        field = page.locator(f"input[aria-label='{name}, value']")
-        field.fill(str(value))
-        field.press("Tab")
-    page.click("text=Use these axes")
+    mark_axes(page, ((0.1, 0.0), (0.9, 0.0), (0.0, 0.1), (0.0, 0.9)), (10, 90, 0.1, 0.9))
     page.wait_for_function("() => window.terragripFit.plot.view.y.high > 0.9")  # the marks are in view
     page.click("text=Digitise a line")
     page.wait_for_selector(".pictures li.chosen")
@@ -250,21 +250,7 @@ def test_one_origin_is_clicked_for_both_axes(page: Any, served: Served, folder: 
     diagram(folder)
     open_fit(page, served)
     page.select_option("select[aria-label='Open a picture from the folder']", "scan.png")
-    box = page.wait_for_selector("dialog .sheet").bounding_box()
-    scale = box["width"] / 800
-    for point in ((0.0, 0.0), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9)):
-        x, y = pixel(*point)
-        page.mouse.click(box["x"] + x * scale, box["y"] + y * scale)
-    for name, value in (
-        ("Slip axis, point 1", 0),
-        ("Slip axis, point 2", 90),
-        ("Adhesion axis, point 1", 0),
-        ("Adhesion axis, point 2", 0.9),
-    ):
-        field = page.locator(f"input[aria-label='{name}, value']")
-        field.fill(str(value))
-        field.press("Tab")
-    page.click("text=Use these axes")
+    mark_axes(page, ((0.0, 0.0), (0.9, 0.0), (0.0, 0.0), (0.0, 0.9)), (0, 90, 0, 0.9))
     at = "p => window.terragripFit.mapOf(window.terragripFit.state.kept.pictures['scan.png']).toValue(p)"
     np.testing.assert_allclose(page.evaluate(at, list(pixel(0.5, 0.5))), (0.5, 0.5), atol=0.005)
 
