@@ -157,7 +157,7 @@ struct tg_estimator {
     double braked_time;        /* of the last row with a pressed brake; before the first -INFINITY */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
-    tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate; else 0 */
+    tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate or a joint bends; else 0 */
     double slow_time;          /* when the ground speed was last near 0 */
     tgi_settling settling[TG_GROUND_SPEED + 1]; /* by place in a sample */
     tg_lowpass acceleration, lateral, balance;

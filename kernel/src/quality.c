@@ -137,11 +137,12 @@ int32_t tgi_is_recent(const tg_estimator *e, int32_t slot, double time)
 }
 
 /* The yaw rate if no wheel slipped more than its axle's others: that of the axle where the rims of left and right differ least, since a turn
- * shows on every one, and a wheel that spins on its own. */
+ * shows on every one, and a wheel that spins on its own. Of an articulated machine, beyond the yaw rate, that of the axle where they differ
+ * most: while its joint bends a sensor shows the turn of one half. */
 static tg_real turn_of_rims(const tg_estimator *e, double time)
 {
     const tg_settings *s = &e->settings;
-    tg_real least = 0;
+    tg_real least = 0, most = 0;
     int32_t axles = 0;
     for (int32_t k = 0; k < s->axles; k++) {
         tg_real count = 0, side = 0, rim = 0, squares = 0, products = 0;
@@ -156,11 +157,13 @@ static tg_real turn_of_rims(const tg_estimator *e, double time)
         }
         if (count < 2 || !(squares > side * side / count)) continue;
         const tg_real rate = -(products - side * rim / count) / (squares - side * side / count);
-        if (axles && rate * least <= 0) return 0;
-        if (!axles || tgi_fabs(rate) < tgi_fabs(least)) least = rate;
+        const tg_real beyond = rate - e->yaw_rate;
+        if (tgi_fabs(beyond) > tgi_fabs(most)) most = beyond;
+        if (axles && rate * least <= 0) least = 0;
+        else if (!axles || tgi_fabs(rate) < tgi_fabs(least)) least = rate;
         axles++;
     }
-    return least;
+    return s->articulated ? most : least;
 }
 
 /* The yaw rate as last measured; after a second without it the vehicle is assumed to drive straight, or to turn as its rims may do. */
@@ -172,7 +175,7 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
     } else if (row->time - e->yaw_time > 1) {
         e->yaw_rate = 0;
     }
-    e->unseen_turn = row->time - e->yaw_time > 1 ? turn_of_rims(e, row->time) : 0;
+    e->unseen_turn = row->time - e->yaw_time > 1 || e->settings.articulated ? turn_of_rims(e, row->time) : 0;
 }
 
 /* Whether the ground speed contradicts standstill: while no wheel turns, for half a second, since a single jump is the sensor's. */

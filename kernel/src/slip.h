@@ -36,13 +36,13 @@ TG_INLINE tgi_slip tgi_slip_of(tg_lanes omega, tg_lanes v, tg_lanes radius, tg_r
 }
 
 /* Variance of the slip of wheels i to i + 3 by a turn of which the rims show `rate`: where wheels steer it is all of that, where they skid
- * about half. `v`: of the vehicle. */
+ * about half; while a joint bends it is the error itself. `v`: of the vehicle. */
 TG_INLINE tg_lanes tgi_turn_variance(const tg_settings *s, int32_t i, tg_lanes omega, tg_real v, tg_real rate)
 {
     if (rate == 0) return lanes_all(0);
     const tg_lanes hub = tgi_hub_of(tgi_middle_of(s, v, rate) - lanes_load(s->wheel_side + i) * rate, lanes_load(s->wheel_ahead + i) * rate);
     const tg_lanes radius = lanes_load(s->rolling_radius + i);
     const tg_lanes change = tgi_slip_of(omega, hub, radius, s->standstill_speed).slip - tgi_slip_of(omega, lanes_all(v), radius, s->standstill_speed).slip;
-    return change * change / 2;
+    return s->articulated ? change * change : change * change / 2;
 }
 #endif

@@ -179,7 +179,7 @@ def _deflection(wheel: Wheel, radius: float, load: float) -> float:
 def put_axles(settings: Any, vehicle: Vehicle) -> None:
     """Write into a tg_settings the axles, their loads and levers, the machine's length, and where its ground speed is measured."""
     levers, mass = load_levers(vehicle.axle_to_rear), vehicle.axle_mass
-    settings.axles = len(vehicle.axle_names)
+    settings.axles, settings.articulated = len(vehicle.axle_names), vehicle.articulated
     settings.receiver_ahead, settings.receiver_side = vehicle.receiver
     for k in range(len(mass)):
         settings.load_share[k] = mass[k] / mass.sum()

@@ -141,10 +141,13 @@ def slower_warnings(
     straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
     if turn is None:
-        usable, slowed = straight, dict.fromkeys(sides, _inner(recording, vehicle, means))
+        usable, slowed = straight, dict.fromkeys(sides, np.min(_inner(recording, vehicle, means), axis=0))
     else:
         yaw = means.of(turn)
         usable, slowed = np.isfinite(yaw), {wheel: yaw * side for wheel, side in sides.items()}
+        if vehicle.articulated:  # while its joint bends the other half turns faster or slower than this one
+            bent = np.max(_inner(recording, vehicle, means), axis=0)
+            slowed = {wheel: np.maximum(slower, bent) for wheel, slower in slowed.items()}
     least = _PULLING * vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     stated = vehicle.uncertainty.wheel_radius
     slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
@@ -191,12 +194,12 @@ def _turns(vehicle: Vehicle, means: Means, turn: Floats, within: Bools) -> bool:
 
 
 def _inner(recording: Recording, vehicle: Vehicle, means: Means) -> Floats:
-    """By how much [m/s] the inner hubs may be slower than the vehicle in each window (n,): half of what the rims of left and right differ
-    by on the axle where they differ least, for a turn shows on every one."""
+    """By how much [m/s] the inner hubs of each axle may be slower than the vehicle in each window (axles, n): half of what the rims of left
+    and right differ by. A turn shows on every axle, so where no joint bends the least counts."""
     rims = {
         wheel: radius * window_means(recording.channels[name], means.place, means.count)[means.rows]
         for wheel, radius in vehicle.radii.items()
         if (name := f"wheel_speed_{wheel}") in recording.channels
     }
     apart = [np.abs(one) / 2 for one in side_differences(vehicle, rims)]
-    return np.min(apart, axis=0) if apart else np.zeros(int(means.rows.sum()))
+    return np.array(apart or [np.zeros(int(means.rows.sum()))])

@@ -60,7 +60,7 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
 
 def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
     """A sentence where the halves of an articulated vehicle turn by different rates while its joint bends: ``turn`` (n,) [rad/s] is that of
-    one of them. Without any the intervals hold what the rims differ by."""
+    one of them. The intervals hold what the rims differ by."""
     wheels = {w for axle in vehicle.axles.values() for w in axle.wheels}
     if (
         turn is None
@@ -85,7 +85,7 @@ def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) 
         return []
     return [
         f"In {np.mean(bends):.0%} of the driving the joint bends: front and rear then turn by different rates, of which the log has one, "
-        f"and slips of the other's wheels are off by up to {quantile(off, 0.95):.2f}, beyond their intervals. Leave these rows out."
+        f"and slips of the other's wheels are off by up to {quantile(off, 0.95):.2f}, which their intervals hold."
     ]
 
 
