@@ -148,7 +148,7 @@ def test_a_figure_over_time_has_lines_intervals_and_stripes_where_they_belong() 
         right.get_xydata(), np.column_stack([10.0 + 0.5 * np.arange(12), np.full(12, 0.2)])
     )
     band = slip.collections[1].get_paths()[0].get_extents()
-    assert (band.ymin, band.ymax) == (pytest.approx(0.2 - 0.0196), pytest.approx(0.2 + 0.0196))
+    assert (band.ymin, band.ymax) == pytest.approx((0.2 - 0.0196, 0.2 + 0.0196), abs=1e-6)
     stripes = [(p.get_x(), p.get_x() + p.get_width()) for p in adhesion.patches]
     assert stripes == [(11.5, 12.0), (14.0, 14.0)]
     assert [t.get_text() for t in speed.get_legend().get_texts()] == ["stuck", "gap"]
