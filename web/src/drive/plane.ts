@@ -4,7 +4,7 @@ import { CanvasInk, type Ink } from "../ui/ink";
 import type { Samples } from "../fit/samples";
 import { View, ticks, type Range } from "../ui/view";
 import { timeOfDay, type Timed } from "../ui/clock";
-import { digits, h } from "../ui/dom";
+import { digits, h, onFrame } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { withUnit } from "../ui/units";
 import { nearestKnown } from "./readout";
@@ -62,7 +62,6 @@ export class Plane {
   private readout = h("output", { class: "readout", "aria-live": "off" });
   private now: Now | null = null;
   private shape: Samples | null = null;
-  private asked = false;
   private forget: () => void;
   private watcher: ResizeObserver;
 
@@ -154,14 +153,7 @@ export class Plane {
     this.draw();
   }
 
-  private later(): void {
-    if (this.asked) return;
-    this.asked = true;
-    requestAnimationFrame(() => {
-      this.asked = false;
-      this.draw();
-    });
-  }
+  private later = onFrame(() => this.draw());
 
   private draw(): void {
     const pen = this.canvas.getContext("2d");

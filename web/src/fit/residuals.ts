@@ -1,6 +1,6 @@
 /** What the active curve leaves: points and bins of the chosen soil less the curve, over slip, under the plot. */
 
-import { digits, h } from "../ui/dom";
+import { digits, h, onFrame } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { CanvasInk } from "../ui/ink";
 import { quality, targetOf, type Quality, type Target } from "./quality";
@@ -15,7 +15,6 @@ export class Residuals {
   summary: Quality = { count: 0, rms: NaN, largest: NaN, r2: NaN };
   private canvas = h("canvas", { "aria-hidden": "true" });
   private view = new View();
-  private asked = false;
   private forget: () => void;
   private watcher: ResizeObserver;
 
@@ -40,14 +39,7 @@ export class Residuals {
     this.watcher.disconnect();
   }
 
-  later(): void {
-    if (this.asked || this.element.hidden) return;
-    this.asked = true;
-    requestAnimationFrame(() => {
-      this.asked = false;
-      this.draw();
-    });
-  }
+  later = onFrame(() => this.draw());
 
   private draw(): void {
     const pen = this.canvas.getContext("2d");

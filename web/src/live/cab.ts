@@ -1,7 +1,7 @@
 /** A page for a tablet in the cab: three big numbers, the warning, and how old they are. It fails visibly. */
 
 import { sampled } from "../fit/samples";
-import { fill, h } from "../ui/dom";
+import { fill, h, onFrame } from "../ui/dom";
 import { tried } from "../ui/notes";
 import type { Page } from "../ui/page";
 import { onUnits, unitFor, unitsChooser, type Kind } from "../ui/units";
@@ -46,28 +46,21 @@ export const page: Page = (main, { query }) => {
     why = reason;
     check();
   };
-  const forget = onUnits(() => show());
-  let asked = false;
-  feed.onRows = show;
-
   /** The newest row, at the next frame. */
-  function show(): void {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      const { ring, hello } = feed;
-      if (!hello || !ring.taken) return;
-      const event = eventNow(ring, hello);
-      if (event in WARNING && !warning.textContent) warn(event, "");
-      if (event in WARNING) warnedAt = ring.now;
-      else if (!(ring.now - warnedAt < LINGER)) fill(warning);
-      const now = reading(ring, hello, peak);
-      for (const name of ["slip", "grip", "speed"] as const) tiles[name].set(now[name]);
-      if (!ring.isPredicted) alarms.check(now, event);
-      check();
-    });
-  }
+  const show = onFrame(() => {
+    const { ring, hello } = feed;
+    if (!hello || !ring.taken) return;
+    const event = eventNow(ring, hello);
+    if (event in WARNING && !warning.textContent) warn(event, "");
+    if (event in WARNING) warnedAt = ring.now;
+    else if (!(ring.now - warnedAt < LINGER)) fill(warning);
+    const now = reading(ring, hello, peak);
+    for (const name of ["slip", "grip", "speed"] as const) tiles[name].set(now[name]);
+    if (!ring.isPredicted) alarms.check(now, event);
+    check();
+  });
+  const forget = onUnits(show);
+  feed.onRows = show;
 
   /** The age of the numbers; old ones are struck out, with a message in the largest letters of the page. */
   function check(): void {

@@ -2,7 +2,7 @@
 
 import { EVENT_COLORS } from "../drive/run";
 import { ticks } from "../ui/view";
-import { digits, h } from "../ui/dom";
+import { digits, h, onFrame } from "../ui/dom";
 import { color, onTheme } from "../ui/theme";
 import { Columns, type Window } from "./columns";
 import type { Ring } from "./feed";
@@ -42,7 +42,6 @@ export class Traces {
   redraws = 0;
   private canvas = h("canvas", { "aria-hidden": "true" });
   private traces: Trace[] = [];
-  private asked = false;
   private pool: Columns[] = [];
   private ranges = new Map<string, [number, number]>();
   private forget: () => void;
@@ -102,14 +101,7 @@ export class Traces {
     this.redraw();
   }
 
-  redraw(): void {
-    if (this.asked) return;
-    this.asked = true;
-    requestAnimationFrame(() => {
-      this.asked = false;
-      this.draw();
-    });
-  }
+  redraw = onFrame(() => this.draw());
 
   private draw(): void {
     const pen = this.canvas.getContext("2d");
