@@ -158,7 +158,7 @@ struct tg_estimator {
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */
     tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate or a joint bends; else 0 */
-    double slow_time;          /* when the ground speed was last near 0 */
+    double leap_time;          /* since when the ground speed contradicts standstill; infinite: it does not */
     tgi_settling settling[TG_GROUND_SPEED + 1]; /* by place in a sample */
     tg_lowpass acceleration, lateral, balance;
     tgi_slip_memory slip_memory;

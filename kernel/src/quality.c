@@ -178,11 +178,18 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
     e->unseen_turn = row->time - e->yaw_time > 1 || e->settings.articulated ? turn_of_rims(e, row->time) : 0;
 }
 
-/* Whether the ground speed contradicts standstill: while no wheel turns, for half a second, since a single jump is the sensor's. */
-static int32_t moves(tg_estimator *e, tg_real ground, double time)
+/* Whether the row's ground speed is a leap at standstill: while no wheel turns, it counts once it has lasted, since a single one is the sensor's. */
+static int32_t leaps(tg_estimator *e, const tg_row *row)
 {
-    if (tgi_fabs(ground) < 2 * e->settings.standstill_speed) e->slow_time = time;
-    return !e->standing || time - e->slow_time > (double)e->settings.tuned.leap;
+    const tg_settings *const s = &e->settings;
+    const tg_real speed = row->value[TG_GROUND_SPEED];
+    if (isnan(speed)) return 0;
+    if (!e->standing || tgi_fabs(speed) < 2 * (s->standstill_speed + s->noise[TG_GROUND_SPEED])) {
+        e->leap_time = (double)INFINITY;
+        return 0;
+    }
+    if (isinf(e->leap_time)) e->leap_time = row->time;
+    return row->time - e->leap_time <= (double)s->tuned.leap;
 }
 
 typedef struct { /* of low-passes: worked out once for all speeds of a row whose last samples came together */
@@ -214,7 +221,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     const tg_settings *s = &e->settings;
     shares pass = {s->tuned.settle, 0, 0, 0};
     int32_t n = s->machine.wheels, seen = 0;
-    const tgi_settling *const ground = settle(e, row, TG_GROUND_SPEED, &pass);
+    const tgi_settling *const ground = leaps(e, row) ? &e->settling[TG_GROUND_SPEED] : settle(e, row, TG_GROUND_SPEED, &pass);
     tg_real fastest = 0, soonest = 0, forward = 0, backward = 0, over = 0, rim = 0, course = ground->soon;
     for (int32_t i = 0; i < n; i++) {
         const tgi_settling *const wheel = settle(e, row, TG_WHEEL_SPEED + i, &pass);
@@ -230,7 +237,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row)
     if (seen > 0) rim /= (tg_real)seen;
     if (tgi_is_recent(e, TG_GROUND_SPEED, row->time)) {
         seen++;
-        if (moves(e, ground->settled, row->time)) over = tgi_fabs(ground->settled);
+        over = tgi_fabs(ground->settled);
     } else {
         course = rim;
     }

@@ -104,6 +104,25 @@ def test_a_leap_of_the_ground_speed_does_not_end_standstill():
     assert np.abs(estimates["ground_speed"]).max() < 0.1
 
 
+def test_leaps_of_a_slow_receiver_do_not_turn_a_machine_at_rest_around():
+    """A stop between two drives; the ground speed comes at 2.5 Hz, and two of its samples there say -1.5 m/s."""
+    base = drive(
+        24.0,
+        rate=10.0,
+        speed=lambda t: 0.6 * np.clip(np.minimum(10 - t, 1), 0, 1) + 0.6 * np.clip(t - 16, 0, 1) + 1e-9,
+    )
+    ground = np.where(np.arange(len(base.recording)) % 4 == 0, base.recording["ground_speed"], np.nan)
+    leapt = ground.copy()
+    leapt[[120, 136]] = -1.5
+    plain, hit = (run(base.recording.with_channels(ground_speed=speed)) for speed in (ground, leapt))
+    still = (plain["event"] == "standstill") & (plain.time > 11)
+    assert still.sum() > 30
+    assert (hit["event"][still] == "standstill").all()
+    assert np.abs(hit["ground_speed"])[still].max() < 0.1
+    after = plain.time > 16.5
+    assert np.abs(hit["adhesion_rr"] - plain["adhesion_rr"])[after].max() < 0.01
+
+
 def test_wheels_that_spin_on_the_spot_are_no_standstill():
     base = drive(10.0, slip=lambda t: 0.0 * t + 0.97, speed=lambda t: 0.02 + 0.0 * t)
     estimates = run(base.recording)

@@ -22,7 +22,7 @@ def machine(wheels: tuple[str, ...]) -> tg.Vehicle:
 def drive(wheels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Instants (n,) and speeds (n, 1 + wheels) [m/s] at uneven steps, with missing samples, spikes and a leap."""
     draws = np.random.default_rng(seed)
-    time = np.cumsum(draws.uniform(0.01, 0.6, 250))
+    time = np.cumsum(draws.uniform(0.03, 0.6, 250))
     speed = 1.5 + np.sin(time / 4)
     slip = 0.1 + 0.1 * np.sin(time[:, None] / (3 + np.arange(wheels)))
     speeds = np.c_[speed, speed[:, None] / (1 - slip)] + 0.02 * draws.standard_normal((250, 1 + wheels))

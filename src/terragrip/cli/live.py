@@ -138,6 +138,7 @@ def command(
         library=_library(library),
         setpoint=_setpoint(setpoint, speed),
         driveline=known["driveline"],
+        cycle=known["cycle"],
     )
     many = any(VEHICLE in uri for uri in (*source, *(sink or ()))) or index is not None
     service: Service | ManyService
@@ -205,7 +206,7 @@ def _many(
 def _settings(path: Path | None) -> dict[str, Any]:
     """Noise, update periods and driveline that estimates were made with; raises InputError where the file does not hold them."""
     if path is None:
-        return {"noise": {}, "held": {}, "driveline": None}
+        return {"noise": {}, "held": {}, "driveline": None, "cycle": None}
     from terragrip.estimation import Estimates
     from terragrip.estimation.provenance import settings_of
 
@@ -214,7 +215,8 @@ def _settings(path: Path | None) -> dict[str, Any]:
     driveline = about.get("driveline")
     if driveline is not None and "engine" not in driveline:
         driveline = None  # of an earlier version
-    return {"noise": known["noise"], "held": known["held"], "driveline": driveline}
+    of_it = {name: known.get(name) for name in ("noise", "held", "cycle")}
+    return {**of_it, "driveline": driveline}
 
 
 def _held(pairs: list[str]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from terragrip.estimation.by_cycle import ByCycle
 from terragrip.estimation.by_engine import ByEngine
 from terragrip.estimation.driveline import by_engine
 from terragrip.estimation.estimates import Estimates
@@ -109,6 +110,20 @@ def estimated(
                 planned=planned,
                 progress=progress,
                 together=driven.machine.together,
+            )
+        )
+        return
+    if (cycles := ByCycle.of(log)) is not None:
+        rows = log.rows
+        yield from cycles.spread(
+            estimated(
+                cycles.log(log),
+                vehicle,
+                options,
+                beside=beside,
+                planned=planned and (lambda _, names: planned(rows, names)),
+                progress=progress,
+                together=together,
             )
         )
         return

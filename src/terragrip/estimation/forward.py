@@ -13,6 +13,7 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.methods import SLIP_ONLY
 from terragrip.estimation.provenance import about_recording, about_run, notes_of
+from terragrip.recording.schema import CARRIED
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 Codes = npt.NDArray[np.uint8]
 
 GAP = EVENTS.index("gap")
-CARRIED = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
-"""Channels that are copied to the estimates as they were measured."""
 
 
 def run(

@@ -66,7 +66,7 @@ def settings_of(
     known, hint = about.get("settings"), "estimate the log again with this version"
     if not isinstance(known, dict) or not {"noise", "held"} <= set(known):
         raise InputError("contains no settings", file=file, place=place, hint=hint)
-    for name in ("noise", "held", *needed):
+    for name in ("noise", "held", *needed, *({"cycle"} & set(known))):
         value = known.get(name, "nothing")
         if name == "channels":
             sound = isinstance(value, list) and all(isinstance(one, str) for one in value)

@@ -27,6 +27,7 @@ from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.checks import NOTHING_TOWED, refuse_estimates
 from terragrip.recording.counted import refuse_counted
+from terragrip.recording.cycles import in_cycles
 from terragrip.recording.held import fresh_samples, held_period, measured_part
 from terragrip.recording.noise import white_noise
 from terragrip.recording.schema import TIME, has_torque, is_own, unit_of
@@ -129,7 +130,7 @@ def inspect(
         warnings.insert(0, _SPARSE.format(size_of(path) / 1e9, every))
     unfit = ""
     if recording is not None:
-        warnings += unit_warnings(recording, machine)
+        warnings += unit_warnings(in_cycles(recording), machine)
         unfit = _unfit(recording, machine)
         warnings += [unfit] * bool(unfit and f"{unfit}." not in warnings)
         log = log if chosen is None else _as_table(recording, log)

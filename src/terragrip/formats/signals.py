@@ -13,12 +13,11 @@ from terragrip.arrays import Floats, Ints
 from terragrip.errors import InputError
 from terragrip.formats.table import LogTable, Wanted, kept_rows
 from terragrip.recording.columns import SINCE_1970
+from terragrip.recording.cycles import CYCLE
 from terragrip.recording.schema import TIME
 
 SAME = 1e-3
 """Share of the shortest typical spacing within which two stamps are one instant, whatever they are of."""
-_CYCLE = 0.05
-"""The same of stamps of different clocks: samples of one cycle, as of messages that a bus carries one after another."""
 _STEP = 1.0  # s by which a clock that was set goes back: samples that came late are no such step
 
 
@@ -219,7 +218,7 @@ def _cycles(clocks: list[Floats]) -> tuple[Floats, list[npt.NDArray[np.int32]]]:
     """`union` of clocks, a cycle of messages as one instant."""
     spacings = [float(np.median(np.diff(clock))) for clock in clocks if len(clock) > 2]
     shortest = min((s for s in spacings if s > 0), default=0.0)
-    return union(clocks, SAME * shortest, _CYCLE * shortest)
+    return union(clocks, SAME * shortest, CYCLE * shortest)
 
 
 def _spread(values: npt.NDArray[Any], rows: npt.NDArray[np.int32], length: int) -> npt.NDArray[Any]:

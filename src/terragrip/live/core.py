@@ -53,6 +53,7 @@ class Settings:
     updates. ``noise``: SDs [SI] by channel, over the vehicle file's. ``ground``: whether ground changes and soils are followed. ``learn``:
     whether noise and held channels that are not given are learned from the rows as they come (`terragrip.estimation.learning`).
     ``driveline``: what an earlier log showed of a machine with engine torque (`terragrip.estimation.engine_estimator`).
+    ``cycle``: see `Reorder`.
     """
 
     sources: tuple[str, ...] = ()
@@ -64,6 +65,7 @@ class Settings:
     noise: Mapping[str, float] = field(default_factory=dict)
     learn: bool = True
     driveline: Mapping[str, Any] | None = None
+    cycle: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -84,7 +86,7 @@ class Core:
         self.ground: LiveGround | None = None
         self.settings = settings
         self.counts = Counts()
-        self.reorder = Reorder(settings.window, self.counts)
+        self.reorder = Reorder(settings.window, self.counts, settings.cycle)
         align = len(settings.sources) > 1
         self.clocks = [SourceClock(align) for _ in settings.sources]
         self._paces = [Pace() for _ in settings.sources]

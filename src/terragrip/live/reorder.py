@@ -3,7 +3,8 @@
 Channels of a source that have always come together are a stream; a regular one has a period, the median of its last steps.
 The earliest row waits for streams that are due by its instant, for at most ``window`` seconds after it came. So in good
 order nothing waits (an estimate follows its sample at once), a sample out of order finds its place, and parts of one
-instant that come in several messages become one row. A stream that stays away for LOST periods is no longer waited for.
+instant or of one cycle (`terragrip.recording.cycles`) that come in several messages become one row. A stream that stays away for LOST
+periods is no longer waited for.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 
 from terragrip.live.counts import Counts
 from terragrip.live.outputs import Values
+from terragrip.recording.cycles import CYCLE
 
 LOST = 5  # periods
 DOUBLED = 100  # values of a channel, after which it is reported where they are over half of its own
@@ -118,11 +120,15 @@ _Layout = tuple[list[Stream], list[Stream], bool]
 
 
 class Reorder:
-    """The buffer; ``counts`` counts what is late, doubled and missing."""
+    """The buffer; ``counts`` counts what is late, doubled and missing.
 
-    def __init__(self, window: float, counts: Counts) -> None:
+    ``cycle``: time [s] within which samples of different streams are of one row; None: by the shortest period of the streams.
+    """
+
+    def __init__(self, window: float, counts: Counts, cycle: float | None = None) -> None:
         self.window = window
         self.counts = counts
+        self.cycle = cycle
         self.streams: list[Stream] = []
         self._layouts: dict[Parts, _Layout] = {}
         self.pending: list[Pending] = []
@@ -166,30 +172,55 @@ class Reorder:
             row = self.pending[0]
             layout = self._layouts.get(row.parts) or self._streams_of(row)
             expired = now - row.arrival >= self.window
-            if not expired and not self._is_complete(row.time, layout):
+            cycle = self._cycle()
+            if not expired and not self._is_complete(row.time, layout, cycle):
                 break
+            if self._join_cycle(cycle):
+                layout = self._layouts.get(row.parts) or self._streams_of(row)
             out.append(self._release(row, layout, expired))
         return out
 
-    def _is_complete(self, time: float, layout: _Layout) -> bool:
+    def _cycle(self) -> float:
+        if self.cycle is not None:
+            return self.cycle
+        if len(self.streams) < 2:
+            return 0.0
+        shortest = min((s.period for s in self.streams if s.period > 0.0), default=0.0)
+        return CYCLE * shortest if shortest < float("inf") else 0.0
+
+    def _join_cycle(self, cycle: float) -> bool:
+        """Put the rows of the first one's cycle into it, where no channel is in two of them; returns whether there were any."""
+        pending, end = self.pending, 1
+        while end < len(pending) and pending[end].time - pending[end - 1].time <= cycle:
+            end += 1
+        names = [name for row in pending[:end] for name in row.values]
+        if end == 1 or len(set(names)) < len(names):
+            return False
+        for row in pending[1:end]:
+            for source, channels in row.parts:
+                pending[0].merge(source, {name: row.values[name] for name in channels})
+        del pending[1:end]
+        return True
+
+    def _is_complete(self, time: float, layout: _Layout, cycle: float) -> bool:
         """Whether the first row lacks nothing that is due, and its channels were known (a new one may belong to others still to come)."""
         present, absent, known = layout
         for stream in present:
             if time > stream.calm and stream.awaited(time, True):
                 return False
         for stream in absent:
-            if stream.awaited(time, False) and not self._has_come(stream):
+            if stream.awaited(time + cycle, False) and not self._has_come(stream):
                 return False
         return known
 
     def _has_come(self, stream: Stream) -> bool:
         """Whether the sample that is due is here, with a stamp behind the first row's: on a bus frames come a little sooner or later."""
-        latest, mine = stream.due_from + 1.5 * stream.period, stream.channels[0]
-        return any(
-            row.time <= latest and source == stream.source and mine in names
-            for row in self.pending[1:]
-            for source, names in row.parts
-        )
+        latest, lacking = stream.due_from + 1.5 * stream.period, set(stream.channels)
+        for row in self.pending[1:]:
+            for source, names in row.parts:
+                if row.time <= latest and source == stream.source:
+                    lacking.difference_update(names)
+        return not lacking
 
     def _streams_of(self, row: Pending) -> _Layout:
         """The streams that the row holds and those it lacks, and whether these are all its channels.
@@ -270,6 +301,7 @@ class Reorder:
         out = []
         while self.pending:
             row = self.pending[0]
+            self._join_cycle(self._cycle())
             out.append(self._release(row, self._streams_of(row), expired=False))
         return out
 

@@ -119,8 +119,8 @@ class Segment:
 
         from terragrip.estimation.engine_estimator import EngineEstimator
         from terragrip.estimation.estimates import Estimates
-        from terragrip.estimation.forward import CARRIED
         from terragrip.estimation.provenance import about_run
+        from terragrip.recording.schema import CARRIED
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}

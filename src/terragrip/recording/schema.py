@@ -36,6 +36,10 @@ CHANNELS = {
 }
 LABELS = ("soil",)
 REFERENCE = "true_"  # columns with this beginning pass through unchanged
+REFERENCES = (REFERENCE, "wheel_force_")
+"""Beginnings of the columns that no filter may use."""
+CARRIED = ("latitude", "longitude", "altitude", "fuel_rate", "mass", "hitch_load")
+"""Channels that are copied to the estimates as they were measured."""
 
 
 def split_channel(name: str) -> tuple[str, str] | None:

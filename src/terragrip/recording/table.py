@@ -19,7 +19,7 @@ from terragrip.recording.columns import numbers, seconds, stamps_of, start_of, t
 from terragrip.recording.frames import frame_of, in_si
 from terragrip.recording.schema import (
     LABELS,
-    REFERENCE,
+    REFERENCES,
     TIME,
     is_channel,
     split_channel,
@@ -202,7 +202,7 @@ class Recording(ByName):
     @property
     def references(self) -> tuple[str, ...]:
         """Names of the columns that no filter may use: measured wheel forces and ``true_`` columns."""
-        return tuple(n for n in self.channels if n.startswith((REFERENCE, "wheel_force_")))
+        return tuple(n for n in self.channels if n.startswith(REFERENCES))
 
     def select(self, rows: Any) -> Self:
         """The rows of a mask, a slice or an array of increasing indices; a slice copies no data."""

@@ -30,6 +30,7 @@ from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
 from terragrip.recording.brake import unbraked
+from terragrip.recording.cycles import in_cycles
 from terragrip.vehicle import Vehicle, require_vehicle
 
 _OTHER_LOAD = 0.02  # of the mass, by which the load may differ
@@ -88,6 +89,7 @@ def calibrate(
     require_vehicle(vehicle)
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
+    logs = [in_cycles(log) for log in logs]
     sources = [log.source or f"recording {k + 1}" for k, log in enumerate(logs)]
     doubts = _doubts(logs, sources, vehicle)
     if all(speeds_alone(log.channels, vehicle) for log in logs):
