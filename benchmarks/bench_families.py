@@ -5,10 +5,10 @@
 
 Machines: terragrip.simulation.families, split by kind (docs/families.md), and the second plant (benchmarks/second_plant), which
 is held out as a whole. Nothing may be tuned on held-out, nor with its figures in sight. R² of adhesion counts all driven wheels
-together, in rows in which the machine moves. The plain filter (plain_filter.py) has the same log and vehicle file and one fixed Q
-of five, the best of them taken afterwards for each machine. Intervals: family_intervals.py. Each machine is also seen at 50 Hz
-after `terragrip calibrate`, with its true constants, without accelerometer, and with gaps, spikes, jitter, held values and an
-outage in one log (R² there outside the outage), and tractors at 1 Hz. --quick: 8 machines at 100 and 20 Hz, nothing else.
+together, in rows in which the machine moves; *all faults* is its change, outside the outage, where the log has gaps, spikes, jitter,
+held values and an outage. The plain filter (plain_filter.py) has the same log and vehicle file and one fixed Q of five, the best of them
+taken afterwards for each machine. Intervals: family_intervals.py. Each machine is also seen at 50 Hz after `terragrip calibrate`, with its
+true constants, without accelerometer, and with those faults, and tractors at 1 Hz. --quick: 8 machines at 100 and 20 Hz, nothing else.
 --write puts the tables into docs/families.md.
 """
 
@@ -27,7 +27,7 @@ from family_intervals import COVERED, SCORED, Intervals, intervals, knowing_near
 from marked import put
 from plain_filter import INTENSITIES, plain_filter
 from second_plant import draw as second
-from terragrip.estimation import calibrate, estimate
+from terragrip.estimation import Estimates, calibrate, estimate
 from terragrip.estimation.methods import DEFAULT, METHODS
 from terragrip.recording import Recording
 from terragrip.simulation import SimulationResult, families
@@ -57,7 +57,7 @@ BEGIN = "<!-- made by benchmarks/bench_families.py --write: {part} -->"
 
 @dataclass(frozen=True)
 class Row:
-    """One machine at one rate: R² and lag [samples] of both, share of rows that each 95 % interval holds."""
+    """One machine at one rate: R² and lag [samples] of both, share of rows that each 95 % interval holds, change of R² by all faults."""
 
     kind: Kind
     seed: int
@@ -70,6 +70,7 @@ class Row:
     lag: float
     plain_lag: float
     covered: dict[str, float]
+    by_faults: float
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def score_machine(job: Job) -> tuple[list[Row], list[View], list[float]]:
     """One machine at every rate, seen otherwise at VIEW_RATE, and a tractor at 1 Hz."""
     part, kind, seed, rates, method, whole = job
     draw: Callable[..., SimulationResult] = second.draw if part == "second-plant" else families.draw
-    rows = [score(draw(kind, seed, rate=rate), kind, seed, rate, method) for rate in rates]
+    rows = [score(draw, kind, seed, rate, method) for rate in rates]
     if not whole:
         return rows, [], []
     slow = [speeds_hold(draw(kind, seed, rate=1.0), method)] if kind.mass == "tractor" else []
@@ -170,18 +171,20 @@ def view_machine(draw: Callable[..., SimulationResult], kind: Kind, seed: int, m
             seen = result_without(seen, "drive_torque")
         recording = seen.recording
         estimates = estimate(recording, vehicle, method=method)
-        driven, moving = driven_wheels(seen), moving_rows(seen)
-        held = intervals(seen, estimates, driven, moving)
-        outage = 0.6 * seen.scenario.duration
-        outside = moving & ~((recording.time > outage) & (recording.time < outage + OUTAGE + 1.0))
-        truth = np.stack([seen.truth[f"true_adhesion_{w}"] for w in driven], axis=1)
-        estimated = np.full(truth.shape, np.nan)
-        if view != "speeds alone":
-            estimated = np.stack([estimates[f"adhesion_{w}"] for w in driven], axis=1)
-            outside &= np.isfinite(estimated).all(axis=1)  # not before anything was measured
+        held = intervals(seen, estimates, driven_wheels(seen), moving_rows(seen))
+        r2 = np.nan if view == "speeds alone" else r2_outside(seen, estimates)
         over = {name: held.score[name] / oracle[name] for name in SCORED}
-        out.append(View(kind, seed, view, pooled_r2(truth, estimated, outside), held, over))
+        out.append(View(kind, seed, view, r2, held, over))
     return out
+
+
+def r2_outside(result: SimulationResult, estimates: Estimates) -> float:
+    """R² of adhesion in moving rows outside the outage that `draw_faults` makes, once anything was measured."""
+    driven, time, outage = driven_wheels(result), result.recording.time, 0.6 * result.scenario.duration
+    outside = moving_rows(result) & ~((time > outage) & (time < outage + OUTAGE + 1.0))
+    truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in driven], axis=1)
+    estimated = np.stack([estimates[f"adhesion_{w}"] for w in driven], axis=1)
+    return pooled_r2(truth, estimated, outside & np.isfinite(estimated).all(axis=1))
 
 
 def another_drive(kind: Kind, result: SimulationResult) -> SimulationResult:
@@ -218,10 +221,12 @@ def driven_wheels(result: SimulationResult) -> list[str]:
     return [w for w, driven in zip(vehicle.wheels, vehicle.driven, strict=True) if driven]
 
 
-def score(result: SimulationResult, kind: Kind, seed: int, rate: float, method: str) -> Row:
-    """Our method and the plain filter on one recording."""
+def score(draw: Callable[..., SimulationResult], kind: Kind, seed: int, rate: float, method: str) -> Row:
+    """Our method and the plain filter on one machine's recording, and ours where it has all faults."""
+    result, faulty = (draw(kind, seed, rate=rate, faults=faults) for faults in (False, True))
     vehicle, recording = result.vehicle, result.recording
     estimates = estimate(recording, vehicle, method=method)
+    with_faults = estimate(faulty.recording, vehicle, method=method)
     driven = driven_wheels(result)
     rows = np.isfinite(recording[f"wheel_speed_{driven[0]}"])
     truth = np.stack([result.truth[f"true_adhesion_{w}"] for w in driven], axis=1)[rows]
@@ -240,6 +245,7 @@ def score(result: SimulationResult, kind: Kind, seed: int, rate: float, method: 
     return Row(
         kind, seed, rate, vehicle.mass, n, pooled_r2(truth, ours, moving), scores[best], INTENSITIES[best],
         lag(truth, ours, moving), lag(truth, plains[best], moving), intervals(result, estimates, driven, moving_rows(result)).covered,
+        r2_outside(faulty, with_faults) - r2_outside(result, estimates),
     )  # fmt: skip
 
 
@@ -287,6 +293,7 @@ def summary(rows: Sequence[Row], rates: Sequence[float]) -> str:
         "plain",
         *covered,
         "µ under 88 %",
+        "all faults, R² µ",
     ]
     lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
     for rate in rates:
@@ -301,6 +308,7 @@ def summary(rows: Sequence[Row], rates: Sequence[float]) -> str:
         cells += [f"{np.mean([r.lag for r in some]):.1f}", f"{np.mean([r.plain_lag for r in some]):.1f}"]
         cells += [f"{100 * np.nanmean([r.covered[c] for r in some]):.0f}" for c in COVERED]
         cells.append(f"{sum(r.covered['adhesion'] < 0.88 for r in some)} of {len(some)}")
+        cells.append(f"{np.median([r.by_faults for r in some]):+.3f}")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
