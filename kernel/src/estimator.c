@@ -59,8 +59,14 @@ static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step,
     e->belief.channels = not_measured ? count : step->channels;
 }
 
+/* N, that the soil's resistance is a share of. */
+static tg_real weight_on_ground(const tg_estimator *e, const tg_drive *drive)
+{
+    return drive->mass * e->settings.machine.gravity * drive->cosine + drive->hitch_load;
+}
+
 /* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to restart. */
-static int32_t advance(tg_estimator *e, tg_row *row, const tg_input *now, tg_real dt, tg_real *q)
+static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_input *now, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
@@ -73,6 +79,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_input *now, tg_rea
     }
     measured(e, row, y, r);
     tgi_deviations(e, now, e->belief.x);
+    now->hitch_load -= (1 - tgi_held_back(e)) * weight_on_ground(e, drive);
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
         status = tg_filter_predict(&e->filter, dt, now, q);
@@ -111,12 +118,12 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     const tg_machine *m = &e->settings.machine;
     const int32_t n = m->wheels;
     const tg_real d = (tg_real)e->direction;
-    tg_real force = -d * drive->calm_drawbar - e->belief.x[n] * drive->mass * m->gravity * drive->cosine - e->belief.x[n] * drive->hitch_load;
+    tg_real force = -d * drive->calm_drawbar - tgi_held_back(e) * e->belief.x[n] * weight_on_ground(e, drive);
     for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * drive->inverse_mass, time, e->settings.load_filter);
 }
 
-static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, const tg_input *now, tg_course course, tg_real dt, tg_real *q)
+static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_input *now, tg_course course, tg_real dt, tg_real *q)
 {
     int32_t sound = 1;
     tg_belief *b = &e->belief;
@@ -134,7 +141,7 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, const 
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);
     if (course == TG_DRIFT) tgi_drift(e, dt);
     else if (course == TG_REST) tgi_rest(e, drive, row->time);
-    else if (course >= TG_START) sound = advance(e, row, now, dt, q);
+    else if (course >= TG_START) sound = advance(e, row, drive, now, dt, q);
     tgi_believe(e);
     return sound;
 }

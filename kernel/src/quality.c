@@ -27,6 +27,31 @@ static void drop_repetitions(tg_estimator *e, const tg_sample *sample, tg_row *r
     }
 }
 
+/* In a turn on the spot, in which the rims of the two sides go against each other: the vehicle's speed by them, and its variance. How much they
+ * slip in the mean is what they show of the turn beyond its rate; sides may slip as differently as that. Returns whether there is one. */
+static int32_t speed_of_rims(const tg_estimator *e, tg_real yaw, double time, tg_real *speed, tg_real *variance)
+{
+    const tg_settings *s = &e->settings;
+    tg_real count = 0, side = 0, sum = 0, squares = 0, products = 0, ahead = 0, back = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        if (tgi_rolls(e, i) || !tgi_is_recent(e, i, time)) continue;
+        const tg_real rim = s->rolling_radius[i] * e->settling[i].soon;
+        count++;
+        side += s->wheel_side[i];
+        sum += rim;
+        squares += tgi_square(s->wheel_side[i]);
+        products += s->wheel_side[i] * rim;
+        ahead = tgi_max(ahead, rim);
+        back = tgi_max(back, -rim);
+    }
+    if (!(ahead > s->standstill_speed && back > s->standstill_speed && squares > side * side / count)) return 0;
+    const tg_real rate = (side * sum / count - products) / (squares - side * side / count), gone = yaw / rate < 1 ? yaw / rate : 1;
+    if (!(gone > 0)) return 0;
+    *speed = gone * (sum + side * rate) / count;
+    *variance = tgi_square((ahead + back) / 2) * (tgi_square(1 - gone) + tgi_square(s->tuned.least_slip));
+    return 1;
+}
+
 /* A receiver that is not where the ground speed counts measures what the turn adds to it, too: that is taken off, and what the noise of
  * both makes of it is a variance. */
 static void move_to_middle(const tg_estimator *e, tg_row *row)
@@ -36,15 +61,11 @@ static void move_to_middle(const tg_estimator *e, tg_row *row)
     const tg_real yaw = !isnan(seen) ? seen : row->time - e->yaw_time > 1 ? 0 : e->yaw_rate, across = s->receiver_ahead * yaw;
     row->turn_variance = 0;
     if (yaw == 0 || isnan(there) || (across == 0 && s->receiver_side == 0)) return;
-    /* So near to turning on the spot the square of the speed along is within two of its SDs of 0: its root, of noise alone, would be a speed
-     * to one side. There the square itself corrects the speed as believed. */
-    const tg_real square = tgi_square(there) - tgi_square(across);
-    const tg_real spread = 2 * tgi_sqrt(tgi_square(there * s->noise[TG_GROUND_SPEED]) + tgi_square(across * s->receiver_ahead * s->noise[TG_YAW_RATE]));
-    if (square < 2 * spread && tgi_fabs(across) > s->noise[TG_GROUND_SPEED] && e->seen_motion) {
-        const tg_real v = s->method == TG_SPEEDS ? e->speeds.x[0] : (tg_real)e->direction * e->belief.x[s->machine.wheels + 1];
-        const tg_real before = v - s->receiver_side * yaw, by = 2 * tgi_max(tgi_fabs(before), tgi_sqrt(spread));
-        row->value[TG_GROUND_SPEED] = v + (before < 0 ? -1 : 1) * (square - tgi_square(before)) / by;
-        row->turn_variance = tgi_square(spread / by) + tgi_square(s->receiver_side * s->noise[TG_YAW_RATE]);
+    /* On the spot the receiver shows but the turn and how the vehicle slides: of these the root would be a speed, always to one side. */
+    tg_real by_rims, variance;
+    if (tgi_fabs(across) > s->noise[TG_GROUND_SPEED] && speed_of_rims(e, yaw, row->time, &by_rims, &variance)) {
+        row->value[TG_GROUND_SPEED] = by_rims;
+        row->turn_variance = variance < tgi_square(there) ? variance : tgi_square(there);
         return;
     }
     row->value[TG_GROUND_SPEED] = tgi_middle_of(s, there, yaw);
