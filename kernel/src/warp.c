@@ -125,7 +125,7 @@ tgi_slips tgi_driven_slips(const tg_estimator *e)
     const int32_t n = s->machine.wheels, stride = tgi_stride(n);
     const tg_real v = e->belief.x[n + 1], yaw = (tg_real)e->direction * e->yaw_rate, *const omega = e->belief.x + n + 2, *const P = e->belief.P + (n + 2) * (stride + 1);
     tgi_slips slips = {{0}, {0}, 0, v > s->standstill_speed};
-    tg_real bent = 0;
+    tg_real sides = 0;
     for (int32_t i = 0; i < n; i += TG_LANES) {
         const tg_lanes steered = lanes_load(s->wheel_ahead + i), ahead = v - lanes_load(s->wheel_side + i) * yaw, hub = tgi_hub_of(ahead, steered * yaw);
         const tg_lanes inverse = 1 / lanes_load(omega + i), by_radius = lanes_load(e->constants.inverse_radius + i), part = hub * inverse * by_radius;
@@ -138,10 +138,13 @@ tgi_slips tgi_driven_slips(const tg_estimator *e)
             slips.straight[i + j] = 1 - straight[j];
             slips.known &= within[j] && wheel->count > 0 && e->time - wheel->time <= (double)s->tuned.silence;
             slips.variance += tgi_square(straight[j] * inverse[j]) * P[(i + j) * (stride + 1)];
-            bent += tgi_square(s->wheel_side[i + j] / v) * (tgi_square(e->unseen_turn) - 4 * tgi_square(s->noise[TG_YAW_RATE]));
+            sides += tgi_square(s->wheel_side[i + j]);
         }
     }
-    if (s->articulated) slips.known &= bent < 4 * slips.variance; /* a joint that bends shows as a diagonal's slips */
+    if (s->articulated) { /* a joint that bends shows as a diagonal's slips */
+        const tg_real bent = tgi_square(e->unseen_turn) - 4 * tgi_square(s->noise[TG_YAW_RATE]);
+        slips.known &= sides * bent < 4 * slips.variance * v * v;
+    }
     slips.variance *= e->constants.share;
     return slips;
 }
