@@ -12,6 +12,7 @@ from terragrip.physics.adhesion import (
     brixius_resistance,
     effective_parameters,
     efficiency_peak,
+    wismer_luth_resistance,
 )
 
 SLIP = np.linspace(-1, 1, 201)
@@ -117,6 +118,7 @@ def test_brixius_against_hand_figures():
     )
     assert brixius_resistance(number, 0.1) == pytest.approx(1 / 37.5 + 0.05 / np.sqrt(37.5))
     assert brixius_resistance(number) == pytest.approx(1 / 37.5)  # at no slip
+    assert wismer_luth_resistance(40.0) == pytest.approx(0.07)
     with pytest.raises(ValueError, match="positive"):
         brixius_mobility_number(-1.0, 0.5, 1.5, 20e3, 0.2, 1.0)
     for place in range(6):

@@ -36,8 +36,14 @@ def test_the_algebraic_estimate_inverts_the_motion(wheels):
         "tire_resistance": 0.03,
         "bearing_resistance": rng.uniform(0, 3, wheels),
     }
+    vehicle = {"mass": 3000.0, "gravity": 9.81}
     omega, torque, mu = rng.normal(0, 5, shape), rng.normal(0, 900, shape), rng.uniform(-0.2, 0.8, shape)
     load = rng.uniform(300, 9000, shape)
+    drawbar, rho, slope = rng.normal(0, 3000, 5), rng.uniform(0, 0.3, 5), rng.uniform(-0.3, 0.3, 5)
+
     spin = motion.wheel_acceleration(omega, torque, mu, load, **wheel)
+    accel = motion.ground_acceleration(mu, load, drawbar, rho, slope, **vehicle)
     got_mu = motion.algebraic_adhesion(omega, spin, torque, load, **wheel)
     np.testing.assert_allclose(got_mu, mu, rtol=1e-12, atol=1e-13)
+    got_rho = motion.algebraic_soil_resistance(got_mu, load, drawbar, accel, slope, **vehicle)
+    np.testing.assert_allclose(got_rho, rho, rtol=1e-11, atol=1e-12)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terragrip.physics.efficiency import gross_traction, net_traction, tractive_efficiency
+from terragrip.physics.efficiency import gross_traction, motion_resistance, net_traction, tractive_efficiency
 from terragrip.physics.slip import slip
 
 
@@ -53,6 +53,7 @@ def test_slip_grows_by_one_minus_s_times_a_radius_error():
 def test_ratios_by_hand():
     assert net_traction(0.5, 0.08) == pytest.approx(0.42)
     assert gross_traction(0.5, 0.02) == pytest.approx(0.52)
+    assert motion_resistance(0.08, 0.02) == pytest.approx(0.10)
     # κ/(κ + ρ)(1 - s) = .42/.52 * .9
     assert tractive_efficiency(0.5, 0.08, 0.02, 0.1) == pytest.approx(0.42 / 0.52 * 0.9)
 

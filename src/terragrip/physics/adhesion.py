@@ -185,6 +185,11 @@ def brixius_resistance(mobility: ArrayLike, slip: ArrayLike = 0.0) -> Floats:
     return np.asarray(1 / n + 0.5 * np.abs(np.asarray(slip, dtype=float)) / np.sqrt(n))
 
 
+def wismer_luth_resistance(wheel_numeric: ArrayLike) -> Floats:
+    """Wismer and Luth's motion resistance ratio 1.2/Cn + 0.04, so that value - resistance is their net traction ratio."""
+    return np.asarray(1.2 / np.asarray(wheel_numeric, dtype=float) + 0.04)
+
+
 def effective_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """What the data can tell of the paper's four parameters: A = a(1-p), k = -alpha_2, d = a p alpha_1 (physics.md 5).
 

@@ -24,6 +24,15 @@ def gross_traction(adhesion: ArrayLike, tire_resistance: ArrayLike) -> NDArray[A
     return np.add(adhesion, tire_resistance)
 
 
+def motion_resistance(soil_resistance: ArrayLike, tire_resistance: ArrayLike) -> NDArray[Any]:
+    """Motion resistance ratio ρ = ρ_s + ρ_t (ASABE S296), the unindexed ρ of paper eq. 7 as read here
+    (physics.md 2).
+
+    Dimensionless, broadcast shape.
+    """
+    return np.add(soil_resistance, tire_resistance)
+
+
 def tractive_efficiency(
     adhesion: ArrayLike, soil_resistance: ArrayLike, tire_resistance: ArrayLike, slip: ArrayLike
 ) -> NDArray[Any]:

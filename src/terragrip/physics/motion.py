@@ -99,3 +99,24 @@ def algebraic_adhesion(
     friction = arm * np.asarray(bearing_resistance) * np.asarray(wheel_speed)
     drive = np.asarray(torque) - np.asarray(inertia) * np.asarray(wheel_acceleration) - friction
     return drive / (arm * np.asarray(load)) - np.asarray(tire_resistance)
+
+
+def algebraic_soil_resistance(
+    adhesion: ArrayLike,
+    load: ArrayLike,
+    drawbar: ArrayLike,
+    acceleration: ArrayLike,
+    slope: ArrayLike,
+    *,
+    mass: ArrayLike,
+    gravity: ArrayLike,
+    hitch_load: ArrayLike = 0.0,
+) -> NDArray[Any]:
+    """ρ_s = (Σ μ_i F_zi - F_dx - m dv/dt - m g sinθ)/(m g cosθ + F_dz): eq. 3 solved for the resistance (physics.md 1).
+
+    acceleration dv/dt in m/s², not the specific force; the others as in :func:`ground_acceleration`.
+    Returns (...).
+    """
+    without_resistance = ground_acceleration(adhesion, load, drawbar, 0.0, slope, mass=mass, gravity=gravity)
+    normal = np.asarray(gravity) * np.cos(slope) + np.asarray(hitch_load) / np.asarray(mass)
+    return (without_resistance - np.asarray(acceleration)) / normal
