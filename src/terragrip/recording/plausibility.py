@@ -39,6 +39,7 @@ from terragrip.recording.plain_units import (
 from terragrip.recording.rescaled import rescaled_warnings
 from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_rest_warnings
 from terragrip.recording.reverse import against_warnings, reverse_warnings
+from terragrip.recording.rim_noise import noisy_rim_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
 from terragrip.recording.slowing import slowing_warnings
@@ -246,10 +247,11 @@ _EACH = (
     ),
     Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
     Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means), _FORCES),
+    Check("rim noise", lambda log: noisy_rim_warnings(log.whole, log.vehicle), (*_TIME, "counted")),
     Check(
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
-        (*_COURSES, *_FORCES, "torques"),
+        (*_COURSES, *_FORCES, "torques", "rim noise"),
     ),
     Check(
         "slowing",
