@@ -166,6 +166,7 @@ def test_save_and_load_round_trip(tmp_path: Path, model: str) -> None:
         ("track:", "trak:", "trak (line 4)", "unknown key", "did you mean track?"),
         ("mass: 54 kg", "mas: 54 kg", "axles.front.mas (line 8)", "unknown key", "did you mean mass?"),
         ("0.20 m", "200", "wheel.radius (line 10)", "200 m is impossible", "200 mm or 200 cm? write '200 mm' or '200 cm'"),
+        ("0.20 m", "8", "wheel.radius (line 10)", "8 m is impossible", "write '8 cm' or '8 in'"),
         ("0.20 m", "0,20 m", "wheel.20 m (line 10)", "unknown key", "write a decimal point ('0.20 m')"),
         ("0.20 m", "0 m", "wheel.radius (line 10)", "0 m is impossible", "at least 0.01 m"),
         ("0.30 m", "12 m", "center_of_gravity_height (line 5)", "12 m is impossible", "not exceed 5 m"),

@@ -17,6 +17,9 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_]*$")
 """Names of wheels and axles."""
 
 
+_LENGTHS = ("mm", "cm", "in")
+
+
 def _read(unit: str, low: float, high: float, likely: tuple[str, ...], above: bool) -> Callable[[Any], float]:
     """A validator: a number or a text with a unit, within the limits; a likely wrong unit is named."""
 
@@ -48,15 +51,15 @@ def quantity_of(
 
 
 Mass = Annotated[float, *quantity_of("kg", 0, 2e5, above=True, likely=("g",))]
-Length = Annotated[float, *quantity_of("m", 0.02, 30, likely=("mm", "cm"))]
-Height = Annotated[float, *quantity_of("m", 0, 5, likely=("mm", "cm"))]
-Overhang = Annotated[float, *quantity_of("m", -10, 10, likely=("mm", "cm"))]
-ToolLength = Annotated[float, *quantity_of("m", 0, 50, likely=("mm", "cm"))]
-_Offset = Annotated[float, *quantity_of("m", -30, 30, likely=("mm", "cm"))]
-Width = Annotated[float, *quantity_of("m", 0.05, 60, likely=("cm", "mm"))]
+Length = Annotated[float, *quantity_of("m", 0.02, 30, likely=_LENGTHS)]
+Height = Annotated[float, *quantity_of("m", 0, 5, likely=_LENGTHS)]
+Overhang = Annotated[float, *quantity_of("m", -10, 10, likely=_LENGTHS)]
+ToolLength = Annotated[float, *quantity_of("m", 0, 50, likely=_LENGTHS)]
+_Offset = Annotated[float, *quantity_of("m", -30, 30, likely=_LENGTHS)]
+Width = Annotated[float, *quantity_of("m", 0.05, 60, likely=_LENGTHS)]
 Power = Annotated[float, *quantity_of("W", 1, 2e6, likely=("kW",))]
 FuelPerEnergy = Annotated[float, *quantity_of("m^3/J", 1e-12, 1e-8, likely=("l/kWh",))]
-_Radius = Annotated[float, *quantity_of("m", 0.01, 3, likely=("mm", "cm"))]
+_Radius = Annotated[float, *quantity_of("m", 0.01, 3, likely=_LENGTHS)]
 _Inertia = Annotated[float, *quantity_of("kg m^2", 0, 1e4, above=True)]
 _Pressure = Annotated[float, *quantity_of("Pa", 1e3, 2e6, likely=("kPa", "bar"))]
 _Ratio = Annotated[float, *quantity_of("1", 0, 1, likely=("%",))]
@@ -116,7 +119,7 @@ class Wheel(Part):
 
     radius: _Radius
     inertia: _Inertia
-    width: Annotated[float, *quantity_of("m", 0.005, 3, likely=("mm", "cm"))] | None = None
+    width: Annotated[float, *quantity_of("m", 0.005, 3, likely=_LENGTHS)] | None = None
     mass: Mass | None = None
     radius_model: RadiusModel | None = None
     size: str | None = None
@@ -168,7 +171,7 @@ class Axle(Part):
     wheel: Wheel | None = None
     driven: bool = True
     steered: bool = False
-    x: Annotated[float, *quantity_of("m", 0, 30, likely=("mm", "cm"))] | None = None
+    x: Annotated[float, *quantity_of("m", 0, 30, likely=_LENGTHS)] | None = None
     bearing_resistance: Bearing | None = None
     drive_friction: Friction | None = None
 
@@ -209,7 +212,7 @@ class Payload(Part):
     """Centre of gravity of the load beside the file's ``mass``: from the rear axle ``x`` forward, ``z`` above the ground [m]."""
 
     x: _Offset
-    z: Annotated[float, *quantity_of("m", 0, 6, likely=("mm", "cm"))] | None = None
+    z: Annotated[float, *quantity_of("m", 0, 6, likely=_LENGTHS)] | None = None
 
 
 class Driveline(Part):

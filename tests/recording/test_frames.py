@@ -141,6 +141,15 @@ def test_series_of_unlike_indices_are_taken_by_place_with_a_note() -> None:
     assert any("rows are taken by their place" in note for note in frame_of(mixed, None).notes)
 
 
+def test_labels_that_pandas_made_floats_are_those_of_whole_numbers() -> None:
+    """'2' of a run and '2.0' of another, which has rows without a label, were two soils."""
+    whole = Recording.from_frame(LOG.assign(soil=[1, 2, 2]))["soil"]
+    beside_missing = Recording.from_frame(LOG.assign(soil=[np.nan, 2, 2]))["soil"]
+    assert list(whole) == ["1", "2", "2"]
+    assert list(beside_missing) == ["", "2", "2"]
+    assert list(Recording.from_frame(LOG.assign(soil=["2.0", "2.5", "v2.0"]))["soil"]) == ["2", "2.5", "v2.0"]
+
+
 def test_names_of_several_levels_are_refused_with_the_way_out() -> None:
     with pytest.raises(InputError, match=r"names of several levels; choose one, frame\['robot'\]"):
         Recording.from_frame(pd.concat({"robot": LOG}, axis=1))

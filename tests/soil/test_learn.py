@@ -308,3 +308,12 @@ def test_noise_that_moves_an_intercept_near_zero_moves_no_curve():
     learned = learn_soils(light_work(top=0.5, noise=0.005), curve).soils["field"]
     assert learned.slip_noise.moved < 0.02
     assert learned.curve.identifiability_.identifiable
+
+
+def test_soils_whose_names_differ_in_capitals_alone_are_named():
+    """Grass of one run and grass of another were two soils without a word."""
+    pairs = [p for seed in range(4) for p in usable_pairs(table(seed), WHEELS, 2.6, f"run {seed}")]
+    named = [replace(p, soil=p.soil.title() if p.run == "run 3" else p.soil) for p in pairs]
+    words = learn_soils(named, mass=139).words
+    assert "Fine, fine: a curve each; write the name alike if they are one soil." in words
+    assert not any("a curve each" in one for one in learn_soils(pairs, mass=139).words)

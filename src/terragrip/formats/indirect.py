@@ -102,7 +102,8 @@ def _of_count(
         turn = f" (some {some:.0f} by the radius of {radius:.3g} m, less as it slips)"
     give = f"the scale is 2 pi over the counts in a turn of the wheel{turn}"
     entry = {"derivative_of": name, "scale": 1.0, "unit": "rad"}
-    return Proposal(entry, "", give, 0.6, ("a count of a wheel's turning", *seen))
+    doubt = "" if seen else "a count of the wheel's turning?"
+    return Proposal(entry, doubt, give, 0.6, ("a count of a wheel's turning", *seen))
 
 
 def _derived_speed(

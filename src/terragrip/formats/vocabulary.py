@@ -43,7 +43,7 @@ MEANINGS: dict[str, str] = {
     "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle achse essieu eje assale rad theoretical theorique "
     "theoretisch theoretische teorica teorico radumfangs",
     "motor": "motor moteur motore antrieb antriebs esc drive",
-    "ground": "ground gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
+    "ground": "ground gnd gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
     "grund boden sol suelo suolo",
     "body": "vehicle machine car robot body base ego tractor gross gesamt fahrzeug fzg obd avancement",
     "odometry": "odom odometry",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from typing import Any
 
 import numpy as np
@@ -134,10 +135,10 @@ def texts(name: str, column: npt.NDArray[Any], rows: int, source: str | None) ->
 
 
 def label_of(value: Any) -> str:
-    """A cell as a label, without the blanks around it; empty where it is missing."""
+    """A cell as a label, without the blanks around it; empty where it is missing. 2.0 is 2, which pandas writes so beside missing cells."""
     # test for pandas' NA first: it is neither equal nor unequal to anything
     missing = value is None or type(value).__name__ == "NAType" or value != value
-    return "" if missing else str(value).strip()
+    return "" if missing else re.sub(r"^(\d+)\.0$", r"\1", str(value).strip())
 
 
 def _refuse_thousands(name: str, column: npt.NDArray[Any], time: Floats | None, source: str | None) -> None:

@@ -198,7 +198,7 @@ def learn_soils(
         raise InputError(
             "no sample has a soil label", hint="give a 'soil' column, or name the soil with --soil"
         )
-    soils, missed, words = {}, {}, []
+    soils, missed, words = {}, {}, _alike(grouped)
     for name, parts in sorted(grouped.items()):
         settings = special.get(name, template.bins)
         try:
@@ -219,6 +219,18 @@ def learn_soils(
         words += [f"{name}: {sentence}" for sentence in [scales_apart(learned)] if sentence]
         words += in_words(name, learned.gaps) if learned.gaps else []
     return Campaign(soils, missed, tuple(words))
+
+
+def _alike(names: Iterable[str]) -> list[str]:
+    """A sentence for each of several soils whose names differ in capitals alone."""
+    alike: dict[str, list[str]] = {}
+    for name in sorted(names):
+        alike.setdefault(name.casefold(), []).append(name)
+    return [
+        f"{', '.join(same)}: a curve each; write the name alike if they are one soil."
+        for same in alike.values()
+        if len(same) > 1
+    ]
 
 
 def _clusters(parts: Sequence[RunPairs]) -> NDArray[np.int64]:
