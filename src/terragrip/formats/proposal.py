@@ -72,8 +72,9 @@ def _missing_forces(proposals: Collection[str], wheels: Sequence[str], vehicle: 
         ]
     if len(without) == len(wheels):
         return [
-            "No drive torque was found: slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, "
-            "soil resistance, net traction, efficiency and soil curves cannot."
+            "No drive torque was found (a motor's current, or the pressures on both sides of a hydraulic one, give it in a profile): "
+            "slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, soil resistance, net traction, "
+            "efficiency and soil curves cannot."
         ]
     driven = {} if vehicle is None else dict(zip(vehicle.wheels, vehicle.driven, strict=True))
     notes = [
