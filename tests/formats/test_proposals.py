@@ -50,6 +50,13 @@ def _place() -> dict[str, np.ndarray]:
         ("angular_acceleration_x", "rad/s^2"),
         ("rotational_acceleration_z", "deg/s^2"),
         ("cmd_wheel_speed_fl", "rad/s"),
+        ("rl_rpm_sp", "rpm"),  # a wheel's speed without a question mark
+        ("rpm_goal_rl", "rpm"),
+        ("TorqueSP_RL", "N m"),
+        ("torque_rl_tgt", "N m"),
+        ("MotorSpdSetpt_L", "rpm"),
+        ("GPS_speed_sp", "m/s"),
+        ("cruise_speed", "km/h"),
         ("GPS TOW", "s"),
         ("wheel_speed_fl_variance", "rad/s"),
         ("brake_torque_fl", "N m"),
@@ -488,6 +495,7 @@ def test_of_a_wrench_the_force_along_the_vehicle_is_the_drawbars_and_is_in_newto
     ("name", "channel"),
     [  # in the manner of other people's loggers, some from public code, some made up; the rules were repaired by them
         ("WhlSpdFrntLft", "wheel_speed_fl"),
+        ("WheelSpFL_rpm", "wheel_speed_fl"),
         ("Drehzahl Rad vorne links", "wheel_speed_fl"),
         ("nRadHR", "wheel_speed_rr"),
         ("left_rpm", "wheel_speed_l"),

@@ -57,7 +57,7 @@ MEANINGS: dict[str, str] = {
     # what is no measurement of it
     "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
     "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
-    "consigne consigna objetivo obiettivo trgt",
+    "consigne consigna objetivo obiettivo trgt tgt dmd setpt setp goal ff feedforward cruise",
     "statistic": "std stddev var cov covariance variance accuracy error sigma uncertainty quality dop hdop vdop pdop status state "
     "flag id identifier count counter index idx raw mode valid fix number checksum seq ticks pwm voltage volt temperature "
     "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
@@ -239,6 +239,8 @@ class Vocabulary:
         text, concepts = _symbol_at_end(text) if len(last) - used == 2 else (text, set())
         axis, meant = self._meant(text)
         concepts |= meant
+        if "sp" in text and meant & {"speed", "rotation", "torque", "pull"}:
+            concepts.add("command")  # rpm_sp: a set-point; in WheelSpFL it is the speed
         if text == ["t"]:
             concepts.add("time")
         if len(words) > 1 and unit in ("rpm", "rev/s"):
