@@ -157,6 +157,19 @@ def test_a_matrix_with_a_column_for_each_wheel_is_asked_about(tmp_path: Path) ->
     assert "'wheel_speed_fl: {from: \"log.omega[0]\"}'" in sentence
 
 
+@pytest.mark.parametrize("inside", [False, True])
+def test_the_columns_of_importdata_have_their_names(tmp_path: Path, inside: bool) -> None:
+    """data[1], data[2] ... 'nothing that Terragrip knows', though their names stood beside them."""
+    heads = np.array(["Time (s)", "GroundSpeed (mph)", "WheelSpeedRL (rpm)"], dtype=object)
+    content = {"data": np.c_[TIME, SPEED, 10 * SPEED], "colheaders": heads, "textdata": heads}
+    scipy.io.savemat(tmp_path / "log.mat", {"log": content} if inside else content)
+    inspection = inspect(tmp_path / "log.mat")
+    own = "log." * inside
+    assert inspection.recognised["ground_speed"] == (f"{own}GroundSpeed",)
+    assert inspection.recognised["wheel_speed_rl"] == (f"{own}WheelSpeedRL",)
+    assert inspection.proposals["ground_speed"].unit == "mph"
+
+
 @pytest.mark.parametrize("version", ["5", "7.3"])
 def test_the_export_of_dspace_controldesk(tmp_path: Path, version: str) -> None:
     """``X`` are time vectors, ``Y`` signals, each with the number of its own, counted from 1 (data.X.Data, data.Y(k).Name, .XIndex)."""

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.matlab_values import Array, Opaque, read_array, texts_of
+from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import LABELS, is_own
 from terragrip.units import UnitError, factor_to, is_common
 
@@ -90,6 +91,7 @@ def _is_run(part: Any, first: Any) -> bool:
 def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Around) -> None:
     if _x_and_y(struct, name, contents):
         return
+    struct = _with_named_columns(struct)
     own_units = _value(struct, _UNITS)
     units = own_units if isinstance(own_units, Mapping) else above.units
     clocks = _clocks(struct, name, contents, Around(above.clock, units))
@@ -113,6 +115,19 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
                 own = _joined(name, _own_name(part))  # one element alone is no list
             below = Around(clock, units[key] if isinstance(units.get(key), Mapping) else units)
             walk(part, own, contents, depth + 1, below)
+
+
+def _with_named_columns(struct: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A struct with the columns of its ``data`` by their ``colheaders``, as importdata makes both; any other as it is."""
+    data, heads = _value(struct, ("data",)), texts_of(_value(struct, ("colheaders",)))
+    if heads is None or not _is_numeric(data) or data.shape[1:] != heads.shape:
+        return struct
+    names, units = names_and_units(heads.tolist())
+    table = read_array(data)
+    rest = {
+        key: part for key, part in struct.items() if key.lower() not in ("data", "colheaders", "textdata")
+    }
+    return {**rest, **{name: table[:, k] for k, name in enumerate(names)}, "units": units}
 
 
 def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Around) -> dict[int, Any]:
