@@ -57,6 +57,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real unseen_grade; /* variance of a slope that rho_s may be, see roughness.c */
     tg_real weight; /* N, on level ground, with what hangs on the hitch */
     tg_real reckoned; /* least variance of a ground speed that is not measured, see reckoning.c; else 0 */
+    tg_real unsaid; /* to a smoother: variance of adhesion and rho_s before this row's brake sample, by what the brake did unsaid; -1: it has none */
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
     tg_real disputed;   /* of what its sensor and the forces disagree on, and of its samples' age, */
@@ -153,7 +154,8 @@ struct tg_estimator {
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     int32_t braked;            /* a brake turns the wheels, by an unknown torque */
     int32_t pressed;           /* its last sample, */
-    tg_real unbraked;          /* and rho_s when it came */
+    tg_real unbraked;          /* and rho_s when it came, */
+    double unbraked_time;      /* and when */
     double braked_time;        /* of the last row with a pressed brake; before the first -INFINITY */
     tg_real yaw_rate;
     double yaw_time;           /* of its last sample; before the first -INFINITY, as stamps may be negative */

@@ -172,7 +172,8 @@ static tg_real chatter(const tg_hold *h, tg_real noise)
 }
 
 /* A brake, pressed or just let go, acts with a torque that no channel shows: while it does, adhesion follows the vehicle's motion alone.
- * What it did before its first sample went into rho_s, which is then unsure by twice its change since the sample before: it follows late. */
+ * What it did before its first sample went into rho_s, which is then unsure by twice its change since the sample before: it follows late. So
+ * are, to a smoother, the rows between the two; after a gap the channel reports changes, and missed none. */
 static void watch_brake(tg_estimator *e, tg_row *row)
 {
     const tg_real share = row->value[TG_BRAKE], rho = e->belief.x[e->settings.machine.wheels];
@@ -180,7 +181,9 @@ static void watch_brake(tg_estimator *e, tg_row *row)
     if (!isnan(share)) {
         if (share > TG_PRESSED && !e->pressed) row->missed_braking = tgi_square(2 * (rho - e->unbraked));
         e->pressed = share > TG_PRESSED;
+        e->scene.unsaid = row->time - e->unbraked_time > (double)e->settings.gap ? 0 : row->missed_braking;
         e->unbraked = rho;
+        e->unbraked_time = row->time;
     }
     if (e->pressed) e->braked_time = row->time;
     e->braked = row->time - e->braked_time <= TG_BRAKE_TIME;
@@ -253,6 +256,7 @@ void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive
     const tg_settings *s = &e->settings;
     int32_t driven = 0;
     memset(drive, 0, sizeof *drive);
+    e->scene.unsaid = -1;
     if (e->braked || !isnan(row->value[TG_BRAKE])) watch_brake(e, row);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;

@@ -19,7 +19,7 @@ size_t tg_smooth_carry(const tg_estimator *e)
     if (!e) return 0;
     if (e->settings.method == TG_SPEEDS) return tgi_speeds_length();
     size_t states = (size_t)e->filter.states;
-    return states + states * states + (size_t)e->consider.columns * states;
+    return states + states * states + (size_t)e->consider.columns * states + 1;
 }
 
 tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, const double *const *in, tg_real *records)
@@ -47,14 +47,14 @@ tg_status tg_estimator_record(tg_estimator *e, size_t rows, const double *time, 
     return status;
 }
 
-typedef struct { /* the smoothed moments, state order; inside the caller's carry */
-    tg_real *x, *P, *s;
+typedef struct { /* the smoothed moments, state order, and what a brake did unsaid (tgi_scene); inside the caller's carry */
+    tg_real *x, *P, *s, *unsaid;
 } tgi_smoothed;
 
 static tgi_smoothed inside(const tg_estimator *e, tg_real *carry)
 {
     size_t states = (size_t)e->filter.states;
-    tgi_smoothed m = {carry, carry + states, carry + states + states * states};
+    tgi_smoothed m = {carry, carry + states, carry + states + states * states, carry + tg_smooth_carry(e) - 1};
     return m;
 }
 
@@ -79,6 +79,18 @@ static void to_rows(const tg_estimator *e, const tgi_smoothed *m, tg_belief *b, 
         for (int32_t c = 0; c < e->consider.columns; c++) S[row][c] = m->s[c * states + j];
     }
     b->columns = e->consider.columns;
+}
+
+/* Back from a pressed brake's first sample to the one before it adhesions and rho_s are unsure alike: net traction is not. */
+static void doubt_unsaid(const tg_estimator *e, const tgi_scene *scene, tg_real *unsaid, tg_belief *b)
+{
+    const int32_t n = e->settings.machine.wheels, stride = e->filter.stride;
+    if (scene->unsaid >= 0) *unsaid = scene->unsaid;
+    else if (*unsaid > 0)
+        for (int32_t i = 0; i <= n; i++) {
+            b->P[i * stride + i] += *unsaid;
+            if (i < n) b->P[n * stride + i] += *unsaid;
+        }
 }
 
 static void put(const tg_real *value, double *const *out, size_t row, int32_t last)
@@ -113,6 +125,8 @@ tg_status tg_estimator_smooth(const tg_estimator *e, size_t rows, const tg_real 
         memcpy(&scene, here + filter_length(e), sizeof scene);
         step_back(e, here, next, &m);
         to_rows(e, &m, &belief, S);
+        if (!next) *m.unsaid = 0;
+        doubt_unsaid(e, &scene, m.unsaid, &belief);
         if (e->constants.warps) tgi_warp(&e->constants, belief.x, warp);
         tgi_traction(&e->settings, e->constants.warps ? warp : scene.warp, &belief, (const tg_real(*)[TG_MAX_CONSIDERED])S, &scene, value);
         put(value, out, row, TG_OUT_VERTICAL_LOAD);

@@ -3,7 +3,7 @@
  * against its range. */
 #include "fields.h"
 
-#define TG_SNAPSHOT_VERSION 28u
+#define TG_SNAPSHOT_VERSION 29u
 
 typedef struct {
     char magic[8];

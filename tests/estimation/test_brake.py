@@ -75,6 +75,18 @@ def test_while_a_brake_acts_intervals_hold(method: str, imu: bool) -> None:
     assert np.median(estimates["adhesion_fl_std"][rows]) > 0.2
 
 
+def test_smoothed_rows_before_a_slow_switch_tells_of_the_brake_are_unsure() -> None:
+    """The rows behind knew it: adhesion was held in none of them, soil resistance in 7 %."""
+    made = braked_log(60.0, switch_rate=4.0)
+    time = made.recording.time
+    estimates = tg.estimate(made.recording, robot(), smooth=True)
+    first = brakes(time) & (time > PERIOD) & (time % PERIOD < BRAKING + 0.1)
+    for name in ("adhesion_fl", "adhesion_rr", "soil_resistance"):
+        assert held(estimates, made.truth, name, first) > 0.85, name
+    before = ~brakes(time) & (time % PERIOD > 1.0) & (time % PERIOD < BRAKING - 0.3) & (time > PERIOD)
+    assert np.median(estimates["adhesion_fl_std"][before]) < 0.05
+
+
 def test_the_mean_adhesion_of_all_wheels_follows_the_motion() -> None:
     made = braked_log(switch_rate=100.0)
     estimates = tg.estimate(made.recording, robot())
