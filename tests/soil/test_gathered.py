@@ -117,6 +117,15 @@ def test_runs_add_up_join_and_come_apart_by_soil() -> None:
     assert first.learn(plain).soils["loam"].soil.source == "5 runs: one, two, three and 2 more"
 
 
+def test_a_run_of_one_row_teaches_nothing_and_says_why() -> None:
+    """A warning of NumPy's in the studio's soils."""
+    one = GatheredRuns()
+    one.add(run_of(1).select([0]), "one", "clay")
+    campaign = one.learn(AdhesionCurve(bins=BinSettings(by="pull"), bootstrap=0))
+    assert not campaign.soils
+    assert campaign.words[0].startswith("clay: not fitted, 0 slip bins")
+
+
 def test_a_file_given_twice_and_slip_without_adhesion_are_refused(tmp_path: Path) -> None:
     paths = [tmp_path / "a.parquet", tmp_path / "b.parquet"]
     assert distinct(paths) == paths

@@ -98,7 +98,8 @@ class GatheredRuns:
         for name, blocks in labelled_blocks(estimates, soil, file or run) if signatures else ():
             self.blocks.setdefault(name, []).append(blocks)
         self.makers.add(maker(estimates))
-        self.periods.append(float(np.median(np.diff(estimates.time))) if len(estimates) > 1 else np.nan)
+        if len(estimates) > 1:
+            self.periods.append(float(np.median(np.diff(estimates.time))))
         vehicle = estimates.vehicle
         self.masses.append(vehicle.mass)
         self.common_sd = max(self.common_sd, torque_scale_sd(vehicle))
@@ -135,7 +136,7 @@ class GatheredRuns:
             curve,
             bins,
             float(np.median(self.masses)) if self.masses else None,
-            float(np.nanmedian(self.periods)) if self.periods else 0.01,
+            float(np.median(self.periods)) if self.periods else 0.01,
             self.wheels,
             source=f"{len(self.runs)} runs: {names}",
             common_sd=self.common_sd,
