@@ -131,6 +131,14 @@ def test_too_little_driving_gives_a_reason(drive: Make, vehicle: Vehicle) -> Non
     assert any("too little driving" in u.why for u in result.unknown)
 
 
+def test_one_torque_of_all_wheels_has_one_gain(drive: Make, vehicle: Vehicle) -> None:
+    """Four hydraulic motors at one pressure: what their loads and grip differ by came out as gains of .92 to 1.09, and was written."""
+    log = drive()
+    torques = {f"drive_torque_{wheel}": log["drive_torque_rl"] for wheel in WHEELS}
+    unknown = {u.name: u.why for u in calibrate(log.with_channels(**torques), vehicle).unknown}
+    assert unknown["drive_torque_gain"].startswith("the torques of all driven wheels are one signal")
+
+
 def test_one_driven_wheel_has_nothing_to_be_compared_with(drive: Make) -> None:
     one = Vehicle.from_dict({"mass": 30.0, "axles": {"only": {"mass": 30.0, "wheels": ["fl"]}},
                              "wheel": {"radius": 0.2, "inertia": 0.15}})  # fmt: skip

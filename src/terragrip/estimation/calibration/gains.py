@@ -25,6 +25,7 @@ _SLOWEST = 0.15  # m/s
 _SLIP = (-0.1, 0.6)  # beyond, a wheel digs itself in and leaves the curve that it shares
 _TIGHT = 0.05  # difference of the hubs' speeds over the ground speed
 _MIN_BLOCKS = 8
+_ONE_SIGNAL = 1 - 1e-9  # correlation: two sensors' noise is more
 _BLOCKS_A_SOIL = 15  # for a soil's gains to be held against another's
 _SURPRISE = 0.01
 _SEGMENT = 20.0  # m of track that count as one soil where there is no label
@@ -88,6 +89,8 @@ def relative_gains(
     )
     if len(table) == 0 or len(np.unique(blocks)) < _MIN_BLOCKS:
         return [few, common]
+    if np.corrcoef(table.torque[:, driven].T).min() > _ONE_SIGNAL:
+        return [Unknown(key, "the torques of all driven wheels are one signal, which has one gain"), common]
     rows = _rows(table, vehicle, offset_std, blocks, driven, common_radius_std, errors.yaw)
     fit = fit_shared_gains(rows)
     if fit is None or fit.blocks < _MIN_BLOCKS:
