@@ -99,7 +99,7 @@ def test_labels_are_text_and_missing_ones_empty() -> None:
     assert got[0] is got[6] is got[7]
     assert texts("soil", np.full(2, np.nan), 2, None).tolist() == ["", ""]
     assert texts("soil", np.array([], dtype=object), 0, None).tolist() == []
-    assert texts("soil", np.array([1.0, np.nan, 2.0]), 3, None).tolist() == ["1.0", "", "2.0"]
+    assert texts("soil", np.array([1.0, np.nan, 2.0]), 3, None).tolist() == ["1", "", "2"]
     assert texts("soil", np.array(["a"], dtype=object), 1, None).tolist() == ["a"]
     odd = np.empty(3, dtype=object)
     odd[:] = ["a", ["b"], "c"]
