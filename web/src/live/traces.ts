@@ -141,7 +141,7 @@ export class Traces {
     const [low, high] = this.range(trace, lines.map(({ columns }) => columns));
     const px = (time: number): number => right - ((end - time) / this.span) * (right - left);
     const py = (v: number): number => bottom - ((v - low) / (high - low)) * (bottom - top);
-    this.drawHead(pen, trace, left, y0);
+    this.drawHead(pen, trace, left, right, y0);
     pen.lineWidth = 1;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
@@ -198,21 +198,26 @@ export class Traces {
     });
   }
 
-  private drawHead(pen: CanvasRenderingContext2D, trace: Trace, left: number, y0: number): void {
+  private drawHead(pen: CanvasRenderingContext2D, trace: Trace, left: number, right: number, y0: number): void {
     const title = `${trace.title} [${trace.unit}]`;
     pen.font = "600 13px system-ui, sans-serif";
     pen.fillStyle = color("ink");
     pen.textBaseline = "alphabetic";
     pen.textAlign = "left";
     pen.fillText(title, left, y0 + 16);
-    let x = left + pen.measureText(title).width + 20;
+    let x = left + pen.measureText(title).width + 12;
     pen.font = "12px system-ui, sans-serif";
-    for (const line of trace.lines.length > 1 ? trace.lines : []) {
+    const labelled = trace.lines.length > 1 ? trace.lines : [];
+    const widths = labelled.map((line) => pen.measureText(line.label).width);
+    // On a narrow screen the lines of the legend become shorter, down to a dot, before a wheel is cut off.
+    const room = (right - x - widths.reduce((sum, one) => sum + one, 0)) / labelled.length;
+    const dash = Math.max(3, Math.min(12, room - 12));
+    labelled.forEach((line, k) => {
       pen.fillStyle = color(line.color);
-      pen.fillRect(x, y0 + 10, 12, 3);
-      pen.fillText(line.label, x + 16, y0 + 16);
-      x += 26 + pen.measureText(line.label).width;
-    }
+      pen.fillRect(x, y0 + 10, dash, 3);
+      pen.fillText(line.label, x + dash + 3, y0 + 16);
+      x += dash + Math.max(6, Math.min(14, room - dash)) + (widths[k] as number);
+    });
   }
 
   /** Events at the foot, one mark a pixel. */
