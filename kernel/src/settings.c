@@ -342,7 +342,7 @@ tg_status tg_estimator_init(tg_estimator *e, const tg_settings *settings)
     if (!(settings->standstill_speed > 0)) e->settings.standstill_speed = standstill_speed(settings);
     e->direction = 1;
     for (int32_t i = 0; i < settings->machine.wheels; i++) e->rolls |= (settings->method != TG_SPEEDS && !settings->powered[i] && !settings->driven[i]) << i;
-    e->yaw_time = e->braked_time = -(double)INFINITY;
+    e->yaw_time = e->braked_time = e->unbraked_time = -(double)INFINITY;
     e->leap_time = (double)INFINITY;
     work_out_constants(&e->settings, &e->constants);
     e->shock = e->constants.least_shock;

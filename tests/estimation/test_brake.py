@@ -87,6 +87,19 @@ def test_smoothed_rows_before_a_slow_switch_tells_of_the_brake_are_unsure() -> N
     assert np.median(estimates["adhesion_fl_std"][before]) < 0.05
 
 
+@pytest.mark.parametrize("zero", [-1000.0, 1000.0])
+def test_where_time_begins_changes_nothing_in_a_log_that_begins_braked(zero: float) -> None:
+    """From 0 on, and below, its first smoothed rows had an SD of soil resistance of .49 instead of .01."""
+    log = braked_log(20.0, switch_rate=4.0).recording
+    log = log.select(log.time > PERIOD - 0.7)
+    one, other = (
+        tg.estimate(replace(log, time=log.time - log.time[0] + at), robot(), smooth=True)
+        for at in (0.0, zero)
+    )
+    for name in ("adhesion_fl_std", "soil_resistance_std"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-6, equal_nan=True)
+
+
 def test_the_mean_adhesion_of_all_wheels_follows_the_motion() -> None:
     made = braked_log(switch_rate=100.0)
     estimates = tg.estimate(made.recording, robot())

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pytest
 
 import terragrip as tg
 from drives import drive, robot
-from terragrip.estimation import RunOptions, estimated
+from terragrip.estimation import RunOptions, by_cycle, estimated
 from terragrip.live.core import Core, Settings
 from terragrip.live.outputs import Row
 from terragrip.recording import LogBlocks
+from terragrip.recording.survey import joined
 
 STEP = 0.001
 DURATION = 12.0
@@ -68,6 +73,29 @@ def test_blocks_of_any_length_give_the_same_digits(rows: int) -> None:
     for name in ("adhesion_rr", "slip_fl_std", "soil_resistance", "nis"):
         joined = np.concatenate([part[name] for part in parts])
         assert np.array_equal(joined, once[name], equal_nan=True)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_log_from_disk_is_not_held_in_memory(smooth: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of its rows waited in memory for their estimates, from the first pass on."""
+    apart, made, most = by_message(whole()), [], 0
+
+    def remembered(*parts: Any) -> tg.Recording:
+        result = joined(*parts)
+        made.append(weakref.ref(result.time))
+        return result
+
+    def blocks() -> Iterator[tg.Recording]:
+        nonlocal most
+        for block in LogBlocks.of(apart, 20).blocks():
+            most = max(most, sum(time() is not None for time in made))
+            yield block
+
+    monkeypatch.setattr(by_cycle, "joined", remembered)
+    log = LogBlocks(len(apart), blocks, lambda: apart, from_disk=True)
+    assert sum(map(len, estimated(log, robot(), RunOptions(smooth=smooth)))) == len(apart)
+    assert len(apart) // 20 > 20
+    assert 0 < most < 8
 
 
 def test_live_joins_a_cycle_too_and_with_the_logs_settings_gives_its_digits() -> None:

@@ -50,6 +50,27 @@ def test_a_sample_out_of_order_finds_its_place():
     assert counts.total("missing") == counts.total("late") == 0
 
 
+def test_a_sample_sent_twice_is_refused_wherever_in_its_cycle_it_is():
+    """Of a cycle's later messages the second copy became a row of its own."""
+    counts = Counts()
+    buffer, out = Reorder(0.05, counts), []
+    for k in range(60):
+        for name, delay in (("a", 0.0), ("b", 0.0003), ("b", 0.0003)):
+            buffer.add(k * STEP + delay, 0, k * STEP + delay, {name: float(k)})
+            out += buffer.ready(k * STEP + delay)
+    assert [set(row.values) for row in out[-40:]] == [{"a", "b"}] * 40
+    assert counts.by_channel["b"]["doubled"] == 60
+    assert counts.total("late") == counts.total("missing") == 0
+
+
+def test_of_late_samples_in_a_burst_no_row_is_joined_with_the_next():
+    """The last of them were, and the estimates were not those of the log (`terragrip.recording.cycles`)."""
+    buffer = Reorder(0.05, Counts(), cycle=0.001)
+    for k, name in enumerate("abac"):
+        buffer.add(1.0, 0, 0.001 * k, {name: 1.0})
+    assert [set(row.values) for row in buffer.flush()] == [{"a"}, {"b"}, {"a"}, {"c"}]
+
+
 def test_a_hole_is_waited_for_once_and_counted():
     buffer, counts, _ = settled(window=0.05)
     buffer.add(1.0, 0, 32 * STEP, {"a": 0.0})

@@ -116,6 +116,7 @@ def estimated(
     if (cycles := ByCycle.of(log)) is not None:
         rows = log.rows
         yield from cycles.spread(
+            log,
             estimated(
                 cycles.log(log),
                 vehicle,
@@ -124,7 +125,7 @@ def estimated(
                 planned=planned and (lambda _, names: planned(rows, names)),
                 progress=progress,
                 together=together,
-            )
+            ),
         )
         return
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)

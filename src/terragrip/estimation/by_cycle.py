@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from terragrip.arrays import Ints
 from terragrip.estimation.estimates import Estimates
 from terragrip.recording import LogBlocks, Recording
 from terragrip.recording.cycles import cycle_of, cycles_in, has_full, joined_at
@@ -21,7 +19,6 @@ class ByCycle:
 
     def __init__(self, cycle: float) -> None:
         self.cycle = cycle
-        self._waiting: deque[tuple[Recording, Ints]] = deque()
 
     @classmethod
     def of(cls, log: LogBlocks) -> ByCycle | None:
@@ -41,11 +38,8 @@ class ByCycle:
         """The log with a row for each cycle."""
 
         def blocks() -> Iterator[Recording]:
-            self._waiting.clear()
             for block in self._whole_cycles(log.blocks()):
-                starts = cycles_in(block, self.cycle)
-                self._waiting.append((block, starts))
-                yield joined_at(block, starts)
+                yield joined_at(block, cycles_in(block, self.cycle))
 
         def whole() -> Recording:
             recording = log.whole()
@@ -53,10 +47,13 @@ class ByCycle:
 
         return LogBlocks(log.rows, blocks, whole, log.from_disk)
 
-    def spread(self, parts: Iterator[Estimates]) -> Iterator[Estimates]:
-        """Estimates of the log's own rows: each row has those of its cycle, and what was passed on of its own."""
-        for part in parts:
-            block, starts = self._waiting.popleft()
+    def spread(self, log: LogBlocks, parts: Iterator[Estimates]) -> Iterator[Estimates]:
+        """Estimates of the log's own rows: each row has those of its cycle, and what was passed on of its own.
+
+        The log is read once more beside ``parts``: kept from the passes before, its rows would fill the memory.
+        """
+        for block, part in zip(self._whole_cycles(log.blocks()), parts, strict=True):
+            starts = cycles_in(block, self.cycle)
             rows = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(block)))
             of_rows = part.select(rows)
             own = {n: block.channels[n] for n in (*CARRIED, *block.references) if n in part.columns}

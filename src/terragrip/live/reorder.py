@@ -175,9 +175,10 @@ class Reorder:
             cycle = self._cycle()
             if not expired and not self._is_complete(row.time, layout, cycle):
                 break
-            if self._join_cycle(cycle):
+            last = self._join_cycle(cycle)
+            if last > row.time:
                 layout = self._layouts.get(row.parts) or self._streams_of(row)
-            out.append(self._release(row, layout, expired))
+            out.append(self._release(row, layout, expired, last))
         return out
 
     def _cycle(self) -> float:
@@ -188,19 +189,27 @@ class Reorder:
         shortest = min((s.period for s in self.streams if s.period > 0.0), default=0.0)
         return CYCLE * shortest if shortest < float("inf") else 0.0
 
-    def _join_cycle(self, cycle: float) -> bool:
-        """Put the rows of the first one's cycle into it, where no channel is in two of them; returns whether there were any."""
+    def _join_cycle(self, cycle: float) -> float:
+        """Put the rows of the first one's cycle into it, where no channel is in two of them; returns the instant of the last of them.
+
+        A row as near behind the one before it is of a burst, of which none are joined.
+        """
         pending, end = self.pending, 1
+        last = pending[0].time
+        if last - self.released <= cycle:
+            return last
         while end < len(pending) and pending[end].time - pending[end - 1].time <= cycle:
             end += 1
         names = [name for row in pending[:end] for name in row.values]
         if end == 1 or len(set(names)) < len(names):
-            return False
+            return last
         for row in pending[1:end]:
             for source, channels in row.parts:
                 pending[0].merge(source, {name: row.values[name] for name in channels})
+            last = row.time
+            self._recent.append((last, tuple(row.values)))
         del pending[1:end]
-        return True
+        return last
 
     def _is_complete(self, time: float, layout: _Layout, cycle: float) -> bool:
         """Whether the first row lacks nothing that is due, and its channels were known (a new one may belong to others still to come)."""
@@ -244,10 +253,10 @@ class Reorder:
             self._layouts[row.parts] = present, absent, known
         return present, absent, known
 
-    def _release(self, row: Pending, layout: _Layout, expired: bool) -> Pending:
+    def _release(self, row: Pending, layout: _Layout, expired: bool, last: float) -> Pending:
         present, absent, known = layout
         del self.pending[0]
-        self.released = row.time
+        self.released = last
         self._recent.append((row.time, row.parts[0][1] if len(row.parts) == 1 else tuple(row.values)))
         holes = []
         for stream in present:
@@ -301,8 +310,8 @@ class Reorder:
         out = []
         while self.pending:
             row = self.pending[0]
-            self._join_cycle(self._cycle())
-            out.append(self._release(row, self._streams_of(row), expired=False))
+            last = self._join_cycle(self._cycle())
+            out.append(self._release(row, self._streams_of(row), expired=False, last=last))
         return out
 
     def state(self) -> dict[str, Any]:
