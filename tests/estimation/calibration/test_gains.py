@@ -139,6 +139,20 @@ def test_one_torque_of_all_wheels_has_one_gain(drive: Make, vehicle: Vehicle) ->
     assert unknown["drive_torque_gain"].startswith("the torques of all driven wheels are one signal")
 
 
+@pytest.mark.parametrize("stuck", [WHEELS[:1], WHEELS])
+def test_torques_that_never_change_give_a_reason(
+    drive: Make, vehicle: Vehicle, stuck: tuple[str, ...]
+) -> None:
+    """One gave NumPy's warning on standard error, all of them a ZeroDivisionError."""
+    log = drive()
+    result = calibrate(
+        log.with_channels(**{f"drive_torque_{w}": np.full(len(log), 3.0) for w in stuck}), vehicle
+    )
+    unknown = {u.name: u.why for u in result.unknown}
+    assert "drive_torque_gain" in unknown
+    assert len(stuck) == 1 or "the same whatever the pull" in unknown["drive_torque_scale"]
+
+
 def test_one_driven_wheel_has_nothing_to_be_compared_with(drive: Make) -> None:
     one = Vehicle.from_dict({"mass": 30.0, "axles": {"only": {"mass": 30.0, "wheels": ["fl"]}},
                              "wheel": {"radius": 0.2, "inertia": 0.15}})  # fmt: skip

@@ -89,7 +89,9 @@ def relative_gains(
     )
     if len(table) == 0 or len(np.unique(blocks)) < _MIN_BLOCKS:
         return [few, common]
-    if np.corrcoef(table.torque[:, driven].T).min() > _ONE_SIGNAL:
+    with np.errstate(invalid="ignore"):  # of a torque that never changes: no other's signal
+        alike = np.corrcoef(table.torque[:, driven].T).min()
+    if alike > _ONE_SIGNAL:
         return [Unknown(key, "the torques of all driven wheels are one signal, which has one gain"), common]
     rows = _rows(table, vehicle, offset_std, blocks, driven, common_radius_std, errors.yaw)
     fit = fit_shared_gains(rows)

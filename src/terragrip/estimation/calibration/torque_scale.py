@@ -94,6 +94,12 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     table = table.select(used)
     rows = _balance(table, vehicle)
     scale, strength, residual, weight = _fit(rows)
+    if scale == 0:
+        raise InputError(
+            "the torques are the same whatever the pull",
+            file=logs[0].source,
+            hint="map columns that measure them: one value throughout does not",
+        )
     by_soil = _by_stretches(table, rows, scale)
     error = float(np.hypot(_jackknife(rows, weight), by_soil))
     if not strength > _STRONG * _no_strength(rows, weight):
