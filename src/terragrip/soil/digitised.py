@@ -15,8 +15,7 @@ from terragrip.errors import InputError
 from terragrip.files import refuse_missing, unreadable
 from terragrip.recording.schema import is_channel
 from terragrip.soil.bins import BinSettings
-from terragrip.soil.fit import AdhesionCurve
-from terragrip.soil.learn import explaining
+from terragrip.soil.fit import AdhesionCurve, explaining
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.text import to_text
 

@@ -363,3 +363,14 @@ def _student(freedom: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 0.975))
+
+
+def explaining(curve: AdhesionCurve) -> AdhesionCurve:
+    """The fitted curve. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
+    if curve.r2_ <= 0:
+        raise InputError(
+            f"the {curve.model} curve does not explain its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
+            "slip may have been too small beside its noise",
+            hint="drive at more slip",
+        )
+    return curve

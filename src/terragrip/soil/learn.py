@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from terragrip.errors import InputError
 from terragrip.html import html_notes
 from terragrip.soil.bins import BY_PULL, BY_SLIP, PAPER_BINS, PULL, Bins, BinSettings, bin_pairs
 from terragrip.soil.choice import FORMS, FormVerdict, compare_forms
-from terragrip.soil.fit import AdhesionCurve
+from terragrip.soil.fit import AdhesionCurve, explaining
 from terragrip.soil.identifiability import moved_by_noise
 from terragrip.soil.library import Soil, SoilLibrary
 from terragrip.soil.missing import Gap, in_words, what_to_drive
@@ -223,12 +224,10 @@ def learn_soils(
 
 def _alike(names: Iterable[str]) -> list[str]:
     """A sentence for each of several soils whose names differ in capitals alone."""
-    alike: dict[str, list[str]] = {}
-    for name in sorted(names):
-        alike.setdefault(name.casefold(), []).append(name)
+    alike = [list(same) for _, same in groupby(sorted(names, key=str.casefold), str.casefold)]
     return [
-        f"{', '.join(same)}: a curve each; write the name alike if they are one soil."
-        for same in alike.values()
+        f"{', '.join(sorted(same))}: a curve each; write the name alike if they are one soil."
+        for same in alike
         if len(same) > 1
     ]
 
@@ -389,14 +388,3 @@ def _falls(bins: Bins) -> bool:
         AdhesionCurve(model, intercept=intercept, bootstrap=0).fit_bins(bins).predict(bins.slip[bins.used])
     )
     return bool(values.max() - values[-1] > FALL * abs(values.max()))
-
-
-def explaining(curve: AdhesionCurve) -> AdhesionCurve:
-    """The fitted curve. Raises InputError where it explains nothing of its bins (R2 of 0 or less)."""
-    if curve.r2_ <= 0:
-        raise InputError(
-            f"the {curve.model} curve does not explain its {np.count_nonzero(curve.bins_.used)} bins (R2 {curve.r2_:.2f}): "
-            "slip may have been too small beside its noise",
-            hint="drive at more slip",
-        )
-    return curve
