@@ -145,12 +145,12 @@ def on_the_spot(ahead: float, *, creep: float = 0.0, aside: float = 0.0, every: 
     return Recording.from_frame(columns)
 
 
-def mower(**sizes: Any) -> Vehicle:
-    """The file of `on_the_spot`."""
-    axles = {
-        "front": {"mass": 35, "wheels": ["c"], "driven": False, "steered": True, "bearing_resistance": 0},
-        "rear": {"mass": 65, "wheels": ["l", "r"]},
-    }
+def mower(*, behind: bool = False, **sizes: Any) -> Vehicle:
+    """The file of `on_the_spot`; its caster is ahead or ``behind``."""
+    caster = {"mass": 35, "wheels": ["c"], "driven": False, "steered": True, "bearing_resistance": 0}
+    driven = {"mass": 65, "wheels": ["l", "r"]}
+    front, rear = (driven, caster) if behind else (caster, driven)
+    axles = {"front": front, "rear": rear}
     sizes = {"mass": 100, "wheelbase": 0.7, "track": 0.6, "center_of_gravity_height": 0.0, **sizes}
     return Vehicle.from_dict({**sizes, "axles": axles, "wheel": {"radius": 0.2, "inertia": 0.05}})
 
@@ -175,10 +175,15 @@ def test_round_on_the_spot_a_receiver_ahead_shows_no_speed_along(creep: float, a
         assert np.mean(np.abs(off) < 1.96 * found[f"slip_{wheel}_std"][on_spot]) > 0.9
 
 
-def test_round_on_the_spot_the_soil_pushes_one_side_on_as_it_holds_the_other_back() -> None:
-    """A resistance that held the whole vehicle back drove it backwards from one position of a slow receiver to the next."""
+@pytest.mark.parametrize("behind", [False, True])
+def test_round_on_the_spot_the_soil_pushes_one_side_on_as_it_holds_the_other_back(behind: bool) -> None:
+    """A resistance that held the whole vehicle back drove it backwards as it began to turn (.03 m/s), until it was lost: .001 ± .026 of
+    .06. With the caster ``behind`` it still did."""
     log = on_the_spot(0.0, every=25)
-    found = estimate(log, mower())
-    error = found["ground_speed"][when_on_spot(log)]
-    assert abs(np.mean(error)) < 0.03
-    assert np.sqrt(np.mean(error**2)) < 0.06
+    found = estimate(log, mower(behind=behind))
+    begins = (log.time % 30 > 20.5) & (log.time % 30 < 21.5)
+    assert np.sqrt(np.mean(found["ground_speed"][begins] ** 2)) < 0.01
+    on_spot = when_on_spot(log)
+    assert np.sqrt(np.mean(found["ground_speed"][on_spot] ** 2)) < 0.01
+    off = found["soil_resistance"][on_spot] - 0.06
+    assert np.mean(np.abs(off) < 1.96 * found["soil_resistance_std"][on_spot]) > 0.9
