@@ -170,6 +170,18 @@ def test_the_columns_of_importdata_have_their_names(tmp_path: Path, inside: bool
     assert inspection.proposals["ground_speed"].unit == "mph"
 
 
+def test_of_two_columns_of_importdata_with_one_name_none_is_used(tmp_path: Path) -> None:
+    """The second was, without a word."""
+    heads = np.array(
+        ["Time (s)", "GroundSpeed (m/s)", "GroundSpeed (m/s)", "WheelSpeedRL (rpm)"], dtype=object
+    )
+    content = {"data": np.c_[TIME, SPEED, 2 * SPEED, 10 * SPEED], "colheaders": heads}
+    scipy.io.savemat(tmp_path / "log.mat", content)
+    inspection = inspect(tmp_path / "log.mat")
+    assert "ground_speed" not in inspection.recognised
+    assert sum("occur twice are left out: GroundSpeed" in one for one in inspection.warnings) == 1
+
+
 @pytest.mark.parametrize("version", ["5", "7.3"])
 def test_the_export_of_dspace_controldesk(tmp_path: Path, version: str) -> None:
     """``X`` are time vectors, ``Y`` signals, each with the number of its own, counted from 1 (data.X.Data, data.Y(k).Name, .XIndex)."""

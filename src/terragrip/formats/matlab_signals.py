@@ -91,7 +91,7 @@ def _is_run(part: Any, first: Any) -> bool:
 def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth: int, above: Around) -> None:
     if _x_and_y(struct, name, contents):
         return
-    struct = _with_named_columns(struct)
+    struct = _with_named_columns(struct, contents)
     own_units = _value(struct, _UNITS)
     units = own_units if isinstance(own_units, Mapping) else above.units
     clocks = _clocks(struct, name, contents, Around(above.clock, units))
@@ -117,17 +117,26 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
             walk(part, own, contents, depth + 1, below)
 
 
-def _with_named_columns(struct: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_named_columns(struct: Mapping[str, Any], contents: Contents) -> Mapping[str, Any]:
     """A struct with the columns of its ``data`` by their ``colheaders``, as importdata makes both; any other as it is."""
     data, heads = _value(struct, ("data",)), texts_of(_value(struct, ("colheaders",)))
     if heads is None or not _is_numeric(data) or data.shape[1:] != heads.shape:
         return struct
     names, units = names_and_units(heads.tolist())
     table = read_array(data)
+    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
+    if twice:  # as of a CSV
+        contents.notes.append(
+            f"Columns that occur twice are left out: {', '.join(twice)}. Rename one to use it."
+        )
     rest = {
         key: part for key, part in struct.items() if key.lower() not in ("data", "colheaders", "textdata")
     }
-    return {**rest, **{name: table[:, k] for k, name in enumerate(names)}, "units": units}
+    return {
+        **rest,
+        **{name: table[:, k] for k, name in enumerate(names) if name not in twice},
+        "units": units,
+    }
 
 
 def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Around) -> dict[int, Any]:
