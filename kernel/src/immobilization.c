@@ -15,8 +15,8 @@ static int32_t end_of(const tg_estimator *e, int32_t i)
     return lever > 0 ? 1 : lever < 0 ? -1 : 0;
 }
 
-typedef struct { /* the worst slip (by what is sure of it), its SD, the fastest rim and the sum of rims of a side's driven wheels */
-    tg_real slip, deviation, rim, sum;
+typedef struct { /* the worst slip (by what is sure of it), its SD, and the fastest rim of a side's driven wheels */
+    tg_real slip, deviation, rim;
     int32_t count;
 } side_view;
 
@@ -28,7 +28,6 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
         side->deviation = deviation;
     }
     if (!side->count || tgi_fabs(rim) > tgi_fabs(side->rim)) side->rim = rim;
-    side->sum += rim;
     side->count++;
 }
 
@@ -63,7 +62,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
     side_view side[2];
     memset(&l, 0, sizeof l);
     memset(side, 0, sizeof side);
-    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0;
+    tg_real count = 0, ahead = 0, behind = 0, adhesion = 0, back = 0;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!e->constants.watched[i]) continue;
         const int32_t end = end_of(e, i), where = e->constants.side[i];
@@ -73,6 +72,7 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
         if (where <= 0) add_wheel(&side[0], o[TG_OUT_SLIP + i], deviation, rim);
         if (where >= 0) add_wheel(&side[1], o[TG_OUT_SLIP + i], deviation, rim);
         l.rim += rim;
+        back = tgi_max(back, -(tg_real)e->direction * rim);
         adhesion += mu;
         l.adhesion_deviation += tgi_square(o[TG_OUT_ADHESION_STD + i]) - e->scene.sides[i];
         l.leading += end > 0 ? mu : 0;
@@ -84,10 +84,9 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
     const tg_real sides = (tg_real)((side[0].count > 0) + (side[1].count > 0));
     l.slip = (side[0].slip + side[1].slip) / sides;
     l.deviation = (side[0].deviation + side[1].deviation) / sides;
-    /* Sides that turn against each other turn the vehicle on the spot; both against the travel reverse it. */
-    const int32_t onward = (sides < 2 || side[0].sum * side[1].sum > 0) && (tg_real)e->direction * l.rim > 0;
-    l.fastest = onward ? tgi_fabs(side[0].rim + side[1].rim) / sides : 0;
-    l.rim = onward ? tgi_fabs(l.rim) / count : 0;
+    /* A turn, on the spot too, steering and a joint that bends turn a wheel as far back as another on. */
+    l.fastest = tgi_max(tgi_fabs(side[0].rim + side[1].rim) / sides - back, 0);
+    l.rim = tgi_max(tgi_fabs(l.rim) / count - back, 0);
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
     l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
     l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
@@ -158,6 +157,7 @@ static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
     const tg_real hardly = tgi_max(s->stuck_travel * l->fastest, still), freely = s->free_travel * l->fastest, unsure = TG_SURE * l->travel_deviation;
     const int32_t turning = w->rim > 3 * still && l->fastest > 3 * still, begun = w->turned > TG_HALF_TURN * e->constants.mean_radius;
     const int32_t may_stand = tgi_fabs(l->travel) - unsure < hardly;
+    if (may_stand && w->rim < still) w->turned = 0; /* it rests, whatever its wheels do against each other */
     w->spinning = turning ? count_seconds(w->spinning, dt, may_stand, 1, s->stuck_duration) : 0;
     w->held = turning && may_stand && (w->sinking || l->travel < hardly) && tgi_max(l->travel, 0) + unsure < freely;
     const int32_t long_enough = w->spinning + TG_NEAREST * dt >= s->stuck_duration;

@@ -66,3 +66,28 @@ def test_a_joint_that_bends_shifts_no_adhesion(gyroscope: str) -> None:
     found = tg.estimate(log, machine())
     error = np.array([found[f"adhesion_{wheel}"][bends] for wheel in SIDES]) - MU
     assert np.sqrt(np.mean(error**2)) < 0.05 * MU
+
+
+@pytest.mark.parametrize("spins", [False, True])
+def test_a_joint_that_bends_while_the_machine_stands_is_no_digging_in(spins: bool) -> None:
+    """Its wheels roll against each other, and slip as it starts again: that was called stuck. One that ``spins`` digs in, though another
+    is turned back."""
+    draws, time = np.random.default_rng(6), np.arange(0.0, 90.0, 0.05)
+    speed = np.interp(time, [5, 8, 30, 33, 36, 38], [0, 1.2, 1.2, 0, 0, 0 if spins else 1.2])
+    start = np.interp(time, [35, 35.3, 36, 36.4], [0, 0.2, 0.2, 0]) * (not spins)
+    joint = 0.5 * np.sin(2 * np.pi * (time - 33) / 14) * (time > 33)
+    change, arm = np.gradient(joint, time), LENGTH / 2
+    front = (speed * np.sin(joint) + arm * change) / (arm * np.cos(joint) + arm)
+    behind = speed * np.cos(joint) + arm * front * np.sin(joint)
+    channels = {"ground_speed": speed + 0.02 * draws.standard_normal(len(time)), "angular_velocity_z": front}
+    for wheel, side in SIDES.items():
+        pace, rate = (speed, front) if wheel[0] == "f" else (behind, front - change)
+        spin = start + 4 * ((time > 61) & spins & (wheel == "fl"))
+        noise = 0.01 * draws.standard_normal(len(time))
+        channels[f"wheel_speed_{wheel}"] = ((pace - side * TRACK * rate) / (1 - SLIP) + spin) / RADIUS + noise
+        torque = MU * MASS * 9.80665 / 4 * RADIUS * ((speed > 0) | (spin > 0))
+        channels[f"drive_torque_{wheel}"] = torque + 20 * draws.standard_normal(len(time))
+    found = tg.estimate(Recording(time, channels), machine())
+    stuck = np.isin(found["event"], ["stuck", "immobilization"])
+    assert not np.any(stuck[time < (61 if spins else 90)])
+    assert np.all(stuck[(time > 65) & (time < 89)]) == spins
