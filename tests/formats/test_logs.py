@@ -91,6 +91,20 @@ def test_mdf_bus_logging_by_the_built_in_table(tmp_path: Path) -> None:
     assert np.isfinite(recording["ground_speed"]).sum() == 100
 
 
+def test_mdf_signals_whose_clock_is_no_column_of_numbers_are_left_out(tmp_path: Path) -> None:
+    """Damage says that the first group's stamps are integers of 64 bits that begin within a byte: asammdf gives arrays of bytes."""
+    path = write_mdf(tmp_path / "log.mf4", "4.10")
+    data = bytearray(path.read_bytes())
+    blocks = [at for at in range(0, len(data), 8) if data[at : at + 4] == b"##CN"]
+    bodies = [at + 24 + 8 * int.from_bytes(data[at + 16 : at + 24], "little") for at in blocks]
+    clock = next(body for body in bodies if data[body] == 2)  # a master channel
+    data[clock + 2 : clock + 8] = bytes((0, 4, 1, 0, 0, 0))  # type, bit and byte at which it begins
+    path.write_bytes(data)
+    columns = read_table(path).columns
+    assert "rpm_left" in columns
+    assert "v_ground" not in columns
+
+
 def test_measured_mdf_with_its_dbc(shared: Callable[[str], Path]) -> None:
     folder = shared("data/ingest_samples/css_j1939_mf4")
     dbc = folder / "CSS-Electronics-SAE-J1939-DEMO.dbc"

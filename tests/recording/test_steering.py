@@ -25,7 +25,7 @@ def machine(free: str = "", **front: bool) -> tg.Vehicle:
     )  # fmt: skip
 
 
-def notes(steering: str, vehicle: tg.Vehicle, free: str = "") -> list[str]:
+def field(steering: str, free: str = "") -> Recording:
     """On a field with headlands of 6 m radius, where the driven wheels slip by .03, and by .13 in the field (simulated); m/s, rad/s."""
     draws = np.random.default_rng(7)
     course = np.sin(2 * np.pi * TIME / 40)
@@ -38,7 +38,11 @@ def notes(steering: str, vehicle: tg.Vehicle, free: str = "") -> list[str]:
         hub = np.hypot(speed - side * TRACK * rate, LENGTH * rate * (axle == steering))
         rim = hub / (1 - (0.0 if axle == free else slip))
         columns[f"wheel_speed_{wheel}"] = rim / RADIUS + 0.02 * draws.standard_normal(len(TIME))
-    return [note for note in unit_warnings(Recording.from_frame(columns), vehicle) if "steer" in note]
+    return Recording.from_frame(columns)
+
+
+def notes(steering: str, vehicle: tg.Vehicle, free: str = "") -> list[str]:
+    return [note for note in unit_warnings(field(steering, free), vehicle) if "steer" in note]
 
 
 @pytest.mark.parametrize(
@@ -50,6 +54,14 @@ def test_an_axle_that_steers_is_named(steering: str, free: str) -> None:
     assert note.startswith(f"In turns the wheels of the axle {steering} go faster than the others")
     longest = np.hypot(1.0, LENGTH * 0.33 / 1.8)
     assert note.endswith(f"or slip is wrong there, its own by up to {1 - 1 / longest:.2f}.")
+
+
+@pytest.mark.filterwarnings("error")
+def test_rims_of_exactly_0_at_a_stop_leave_no_word_of_numpy() -> None:
+    stop = TIME < 20
+    log = field("front")
+    log = log.with_channels(**{n: np.where(stop, 0.0, v) for n, v in log.channels.items()})
+    assert any("steer" in note for note in unit_warnings(log, machine()))
 
 
 def test_where_none_steers_or_the_file_says_so_nothing_is_named() -> None:

@@ -69,14 +69,14 @@ def _samples(file: Any, start: float, places: dict[str, tuple[int, int]]) -> Ite
     lengths: dict[int, int] = {}  # of the groups' clocks
     for name, (group, index) in places.items():
         signal = file.get(group=group, index=index)
-        values = _values(signal.samples)
-        if values is None or not len(values):
+        values, stamps = _values(signal.samples), _values(np.asarray(signal.timestamps))
+        if values is None or not len(values) or stamps is None or stamps.dtype.kind == "O":
             continue
         # Invalid samples are left out of some signals of a group: those have a clock of their own.
         is_first = group not in lengths
         is_own = lengths.setdefault(group, len(values)) != len(values)
         if is_first or is_own:
-            yield Clock(name if is_own else group, start + np.asarray(signal.timestamps, dtype=np.float64))
+            yield Clock(name if is_own else group, start + stamps)
         yield Samples(name, name if is_own else group, values, signal.unit or None)
         _let_go(file)
 
@@ -99,7 +99,7 @@ def _names(file: Any, buses: set[int]) -> dict[str, tuple[int, int]]:
 
 
 def _values(samples: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
-    """Samples (n,) as numbers or texts; None of arrays and structures."""
+    """Samples or stamps (n,) as numbers or texts; None of arrays and structures."""
     if samples.ndim != 1 or samples.dtype.names:
         return None
     if samples.dtype.kind in "fiub":

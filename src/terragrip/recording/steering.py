@@ -47,7 +47,7 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
         return []
     for (name, axle), own, other in zip(axles, rims, rims[::-1], strict=True):
         beside = other if axle.driven else ground  # on a headland what is driven slips less
-        ratio = np.log((own / beside)[moving])
+        ratio = np.log(own[moving] / beside[moving])
         share = (ratio[turns] - median(ratio[straight])) / path[turns]
         if np.mean(np.abs(share - 1.0) < _NEAR) > _MOST:
             most = -np.expm1(-quantile(path[turns], 0.95))
