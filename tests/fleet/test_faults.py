@@ -32,8 +32,8 @@ from small_fleet import (
 )
 from terragrip.cli import main
 
-LONG = 500.0
-"""Seconds of a log whose estimate takes some of the worker's time: a busy worker is looked for every 50 ms."""
+LONG = 1000.0
+"""Seconds of a log whose estimate takes some of the worker's time: a busy worker is looked for every 20 ms."""
 
 
 def until(condition: Callable[[], object]) -> None:
@@ -62,12 +62,21 @@ class Fault(threading.Thread):
     def __init__(self, place: Path, cause: Callable[[list[psutil.Process]], None] | None = None) -> None:
         super().__init__(daemon=True)
         self._place, self._cause = place, cause or _kill
+        self._over, self._done = threading.Event(), False
         self.start()
 
     def run(self) -> None:
-        busy: list[psutil.Process] = []  # of the moment of looking: a task may end before the next look
-        until(lambda: busy.extend(at_work(self._place, os.getpid())) or busy)
-        self._cause(busy)
+        while not self._over.wait(0.02):
+            if busy := at_work(self._place, os.getpid()):
+                self._cause(busy)
+                self._done = True
+                return
+
+    def end(self) -> bool:
+        """The call is over: no worker of another test is looked for. Returns whether the fault has happened."""
+        self._over.set()
+        self.join()
+        return self._done
 
 
 def _kill(processes: list[psutil.Process]) -> None:
@@ -90,7 +99,7 @@ def test_a_worker_that_is_killed_in_mid_task(place: Path, capsys: pytest.Capture
     write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     fault = Fault(place)
     code = main(call(place))
-    assert not fault.is_alive(), "no task was seen at work"
+    assert fault.end(), "no task was seen at work"
     said = capsys.readouterr()
     assert (code, said.err) == (0, "")
     assert "0 failed" in said.out
@@ -149,7 +158,7 @@ def test_a_scheduler_that_is_lost_and_restarted(
 
     fault = Fault(place, restart)
     code = main(call(place, "--scheduler", f"tcp://127.0.0.1:{port}"))
-    fault.join(PATIENCE)
+    assert fault.end(), "no task was seen at work"
     said = capsys.readouterr()
     assert (code, said.err) == (0, "")
     assert "0 failed" in said.out
@@ -167,9 +176,11 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     port = free_port()
     started += serve(place, port)
     monkeypatch.setattr("terragrip.fleet.cluster.PATIENCE", 3.0)
-    Fault(place)
+    fault = Fault(place)
     words = call(place, "--scheduler", f"tcp://127.0.0.1:{port}", "--quiet")
-    assert main(words) == 2
+    code = main(words)
+    assert fault.end(), "no task was seen at work"
+    assert code == 2
     errors = capsys.readouterr().err
     assert errors.count("\n") == 1
     assert f"tcp://127.0.0.1:{port} has had no worker for 3 s" in errors
@@ -206,7 +217,7 @@ def test_a_worker_here_that_dask_gives_up_is_started_anew(
     fault = Fault(place, abandon)
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "1 s"}):
         assert main(call(place, "--workers", 1)) == 0
-    assert not fault.is_alive(), "no task was seen at work"
+    assert fault.end(), "no task was seen at work"
     said = capsys.readouterr()
     assert said.err == ""
     assert "0 failed" in said.out
