@@ -15,6 +15,7 @@ from terragrip.estimation import RunOptions, by_cycle, estimated
 from terragrip.live.core import Core, Settings
 from terragrip.live.outputs import Row
 from terragrip.recording import LogBlocks
+from terragrip.recording.cycles import cycles_in
 from terragrip.recording.survey import joined
 
 STEP = 0.001
@@ -62,6 +63,17 @@ def test_a_row_for_each_message_gives_the_estimates_of_a_row_for_each_cycle(smoo
     assert np.array_equal(other["latitude"], apart["latitude"], equal_nan=True)
     assert other.about["settings"]["cycle"] == pytest.approx(0.005)
     assert "cycle" not in one.about["settings"]
+
+
+def test_the_cycles_are_those_of_the_time_in_the_settings() -> None:
+    """Stamps that scatter: some are as far apart as a cycle lasts, and were joined once more by the spacing of the joined rows."""
+    log = by_message(drive(240.0, rate=10.0).recording)
+    scatter = np.random.default_rng(4).normal(0.0, 0.0015, len(log))
+    order = np.argsort(time := np.round(log.time + scatter - log.time[0] + 1.0, 6))
+    log = tg.Recording(time, log.channels).select(order)
+    estimates = tg.estimate(log, robot())
+    changes = np.flatnonzero(np.diff(estimates["adhesion_rr"], prepend=np.nan) != 0.0)
+    assert np.array_equal(changes, cycles_in(log, estimates.about["settings"]["cycle"]))
 
 
 @pytest.mark.parametrize("rows", [1, 7, 100])

@@ -113,21 +113,25 @@ def estimated(
             )
         )
         return
-    if (cycles := ByCycle.of(log)) is not None:
-        rows = log.rows
-        yield from cycles.spread(
-            log,
-            estimated(
-                cycles.log(log),
-                vehicle,
-                options,
-                beside=beside,
-                planned=planned and (lambda _, names: planned(rows, names)),
-                progress=progress,
-                together=together,
-            ),
-        )
+    cycles = ByCycle.of(log)
+    if cycles is None:
+        yield from _row_by_row(log, vehicle, options, beside, planned, progress, together)
         return
+    every = planned and (lambda _, names: planned(log.rows, names))
+    parts = _row_by_row(cycles.log(log), vehicle, options, beside, every, progress, together)
+    yield from cycles.spread(log, parts)
+
+
+def _row_by_row(
+    log: LogBlocks,
+    vehicle: Vehicle,
+    options: RunOptions,
+    beside: str | os.PathLike[str] | None,
+    planned: Callable[[int, tuple[str, ...]], None] | None,
+    progress: Progress | None,
+    together: int,
+) -> Iterator[Estimates]:
+    """`estimated` of a log whose rows are instants."""
     passes = _Passes(progress, log.rows, log.from_disk + 1 + options.smooth)
     known = survey_of(log, passes.of(0) if log.from_disk else None)
     passes.rows = known.rows
