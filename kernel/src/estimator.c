@@ -79,6 +79,7 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_i
     }
     measured(e, row, y, r);
     tgi_deviations(e, now, e->belief.x);
+    /* The model holds the vehicle back by rho_s of its weight and this: what a turn on the spot makes less of it is taken off here. */
     now->hitch_load -= (1 - tgi_held_back(e)) * weight_on_ground(e, drive);
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {

@@ -112,6 +112,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real soon[TG_GROUND_SPEED + 1]; /* of each speed, least share of a sample in its low-pass */
     tg_real trust;                  /* in a ground speed against wheels, by its noise */
     tg_real mean_radius;            /* m */
+    tg_real outermost;              /* m from the middle to the side: the wheel that is farthest, since another may be a caster there */
     tg_real spin_inertia;           /* sum J/r */
     tg_real unknown_torque[8];      /* variance of a torque never seen */
     tg_real unknown_pull;

@@ -206,11 +206,8 @@ tg_real tgi_held_back(const tg_estimator *e)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
-    if (s->method != TG_FILTERED || e->yaw_rate == 0) return 1;
-    tg_real side = 0; /* of the outermost wheel: the last one may be a caster in the middle */
-    for (int32_t i = 0; i < n; i++) side = tgi_max(side, tgi_fabs(s->wheel_side[i] * e->yaw_rate));
-    const tg_real v = e->belief.x[n + 1];
-    if (side <= tgi_fabs(v) || side < s->standstill_speed) return 1;
+    const tg_real side = e->constants.outermost * tgi_fabs(e->yaw_rate), v = e->belief.x[n + 1];
+    if (s->method != TG_FILTERED || side <= tgi_fabs(v) || side < s->standstill_speed) return 1;
     tg_real ahead = 0, back = 0; /* a vehicle that is stuck has a rate of turn of noise, and wheels that turn one way */
     for (int32_t i = 0; i < n; i++) {
         const tg_real rim = tgi_rolls(e, i) ? 0 : s->rolling_radius[i] * e->belief.x[n + 2 + i];

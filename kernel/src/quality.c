@@ -27,27 +27,46 @@ static void drop_repetitions(tg_estimator *e, const tg_sample *sample, tg_row *r
     }
 }
 
+typedef struct { /* speeds of rims along, over how far to the side their wheels are */
+    tg_real count, side, sum, squares, products;
+} rims;
+
+static void add_rim(rims *r, tg_real side, tg_real speed)
+{
+    r->count++;
+    r->side += side;
+    r->sum += speed;
+    r->squares += tgi_square(side);
+    r->products += side * speed;
+}
+
+/* The rate of turn that they show. Returns 0 where they are not beside each other. */
+static int32_t rate_of_turn(const rims *r, tg_real *rate)
+{
+    const tg_real alike = r->side * r->side / r->count;
+    if (r->count < 2 || !(r->squares > alike)) return 0;
+    *rate = (r->side * r->sum / r->count - r->products) / (r->squares - alike);
+    return 1;
+}
+
 /* In a turn on the spot, in which the rims of the two sides go against each other: the vehicle's speed by them, and its variance. How much they
  * slip in the mean is what they show of the turn beyond its rate; sides may slip as differently as that. Returns whether there is one. */
 static int32_t speed_of_rims(const tg_estimator *e, tg_real yaw, double time, tg_real *speed, tg_real *variance)
 {
     const tg_settings *s = &e->settings;
-    tg_real count = 0, side = 0, sum = 0, squares = 0, products = 0, ahead = 0, back = 0;
+    rims all = {0, 0, 0, 0, 0};
+    tg_real ahead = 0, back = 0, rate;
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (tgi_rolls(e, i) || !tgi_is_recent(e, i, time)) continue;
         const tg_real rim = s->rolling_radius[i] * e->settling[i].soon;
-        count++;
-        side += s->wheel_side[i];
-        sum += rim;
-        squares += tgi_square(s->wheel_side[i]);
-        products += s->wheel_side[i] * rim;
+        add_rim(&all, s->wheel_side[i], rim);
         ahead = tgi_max(ahead, rim);
         back = tgi_max(back, -rim);
     }
-    if (!(ahead > s->standstill_speed && back > s->standstill_speed && squares > side * side / count)) return 0;
-    const tg_real rate = (side * sum / count - products) / (squares - side * side / count), gone = yaw / rate < 1 ? yaw / rate : 1;
+    if (!(ahead > s->standstill_speed && back > s->standstill_speed && rate_of_turn(&all, &rate))) return 0;
+    const tg_real gone = yaw / rate < 1 ? yaw / rate : 1;
     if (!(gone > 0)) return 0;
-    *speed = gone * (sum + side * rate) / count;
+    *speed = gone * (all.sum + all.side * rate) / all.count;
     *variance = tgi_square((ahead + back) / 2) * (tgi_square(1 - gone) + tgi_square(s->tuned.least_slip));
     return 1;
 }
@@ -166,18 +185,13 @@ static tg_real turn_of_rims(const tg_estimator *e, double time)
     tg_real least = 0, most = 0;
     int32_t axles = 0;
     for (int32_t k = 0; k < s->axles; k++) {
-        tg_real count = 0, side = 0, rim = 0, squares = 0, products = 0;
+        rims axle = {0, 0, 0, 0, 0};
+        tg_real rate;
         for (int32_t i = 0; i < s->machine.wheels; i++) {
             if (s->wheel_axle[i] != k || tgi_rolls(e, i) || !tgi_is_recent(e, i, time)) continue;
-            const tg_real speed = s->rolling_radius[i] * e->settling[i].settled;
-            count++;
-            side += s->wheel_side[i];
-            rim += speed;
-            squares += tgi_square(s->wheel_side[i]);
-            products += s->wheel_side[i] * speed;
+            add_rim(&axle, s->wheel_side[i], s->rolling_radius[i] * e->settling[i].settled);
         }
-        if (count < 2 || !(squares > side * side / count)) continue;
-        const tg_real rate = -(products - side * rim / count) / (squares - side * side / count);
+        if (!rate_of_turn(&axle, &rate)) continue;
         const tg_real beyond = rate - e->yaw_rate;
         if (tgi_fabs(beyond) > tgi_fabs(most)) most = beyond;
         if (axles && rate * least <= 0) least = 0;

@@ -269,6 +269,7 @@ static void work_out_constants(const tg_settings *s, tgi_constants *c)
         c->soon[i] = soon(s->standstill_speed / s->rolling_radius[i], s->noise[TG_WHEEL_SPEED + i]);
         c->spin_inertia += m->inertia[i] / s->rolling_radius[i];
         c->mean_radius += s->rolling_radius[i] / (tg_real)m->wheels;
+        c->outermost = tgi_max(c->outermost, tgi_fabs(s->wheel_side[i]));
         c->unknown_torque[i] = tgi_square(s->tuned.unknown_torque * m->radius[i] * load);
         c->least_load[i] = s->tuned.least_load * load;
     }
