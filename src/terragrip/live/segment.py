@@ -14,6 +14,7 @@ from terragrip.estimation.arrow import floats
 from terragrip.estimation.engine import EVENTS
 from terragrip.files import sync
 from terragrip.live.outputs import Event, Output, Refusal, Row
+from terragrip.recording.schema import CARRIED
 
 if TYPE_CHECKING:
     import numpy as np
@@ -120,7 +121,6 @@ class Segment:
         from terragrip.estimation.engine_estimator import EngineEstimator
         from terragrip.estimation.estimates import Estimates
         from terragrip.estimation.provenance import about_run
-        from terragrip.recording.schema import CARRIED
 
         table = np.frombuffer(self.estimates).reshape(len(self), -1)
         columns = {name: np.ascontiguousarray(table[:, place]) for name, place in estimator.places.items()}

@@ -19,15 +19,16 @@ _PARTS, _ROWS = 4, 2500  # parts of a long log, each of so many rows, in which n
 def noisy_rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence on wheel speeds whose noise [rad/s] is over twice what the vehicle file states, of logs that are not coarser."""
     stated = vehicle.sensors.wheel_speed
-    if len(recording) > _PARTS * _ROWS:
-        begins = np.linspace(0, len(recording) - _ROWS, _PARTS).astype(np.intp)
-        recording = recording.select((begins[:, None] + np.arange(_ROWS)).ravel())
     rims = {n: v for n, v in recording.channels.items() if n.startswith("wheel_speed_")}
     if stated is None or not rims or len(recording) < 2 or median(np.diff(recording.time)) > _SLOWEST:
         return []
+    part = replace(recording, channels=rims, labels={})
+    if len(part) > _PARTS * _ROWS:
+        begins = np.linspace(0, len(part) - _ROWS, _PARTS).astype(np.intp)
+        part = part.select((begins[:, None] + np.arange(_ROWS)).ravel())
     # In a coarse log the steps are the noise, and the estimator adds them by itself.
-    fine = {name: values for name, values in rims.items() if rounding_noise(values, stated) < stated}
-    noise = sensor_noise(replace(recording, channels=fine))
+    fine = {name: values for name, values in part.channels.items() if rounding_noise(values, stated) < stated}
+    noise = sensor_noise(replace(part, channels=fine))
     noisy = {name: sd for name, sd in noise.items() if sd > _TWICE * stated}
     if not noisy:
         return []
