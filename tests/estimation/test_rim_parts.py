@@ -253,6 +253,17 @@ def test_a_remedy_is_told_once_and_a_drives_speed_beside_wheels_is_not_used() ->
     assert kept.rims[0].radius == pytest.approx(0.81)
 
 
+def test_a_calibrated_machine_is_not_asked_for_a_pass_without_load() -> None:
+    """Field work alone: the log shows no zero, which matters only where no calibration gives it."""
+    wave = 1 + 1e-3 * np.sin(TIME)
+    bus = log_of(ground_speed=1.84 * wave, wheel_based_speed=2.0 * wave)
+    wheels = log_of(ground_speed=1.84 * wave, wheel_speed_rl=2.5 * wave, wheel_speed_rr=2.5 * wave)
+    own = {"calibration": {"wheel_radius": {"rl": 0.81, "rr": 0.81}}}
+    for log in (bus, wheels):
+        assert any(REMEDY in note for note in slip_reference_in(log, tractor()).notes)
+        assert not any("Zero-slip" in note for note in slip_reference_in(log, tractor(**own)).notes)
+
+
 def test_a_public_estimate_takes_the_same_zero() -> None:
     wave = 1 + 1e-3 * np.sin(TIME)
     result = tg.estimate(log_of(ground_speed=1.96 * wave, wheel_based_speed=2.0 * wave), tractor())

@@ -124,6 +124,23 @@ def test_a_second_clock_beside_the_first_is_named(tmp_path: Path, log: pd.DataFr
     assert not [w for w in inspect(tmp_path / "same.csv").warnings if "another clock" in w]
 
 
+def test_positions_are_shown_apart_and_their_noise_is_not_that_of_their_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A field at 51 degrees: .0051 degrees, 570 m, stood as the noise, and 51 from minimum to maximum."""
+    time = np.arange(0, 60, 0.2)
+    noise = 3e-7 * np.random.default_rng(4).standard_normal(time.size)
+    path = tmp_path / "log.csv"
+    pd.DataFrame({"time": time, "wheel_speed_l": 3.0, "latitude": 51 + 2e-6 * time + noise}).to_csv(
+        path, index=False
+    )
+    (latitude,) = [column for column in inspect(path).columns if column.name == "latitude"]
+    assert latitude.noise == pytest.approx(3e-7, rel=0.3)
+    assert main(["inspect", str(path)]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("latitude ")]
+    assert len(set(row.split()[-5:])) == 5
+
+
 def test_time_has_no_noise(tmp_path: Path, log: pd.DataFrame) -> None:
     path = tmp_path / "log.csv"
     log.to_csv(path, index=False)

@@ -62,6 +62,8 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
             zero[rim.wheel] = at
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None
         rims.append(at_zero(rim, at) if learns and at is not None else rim)
+        if at is not None and REMEDY in at.doubt and not learns and _calibrated(rim, vehicle):
+            continue  # the pass without load has been driven
         for one in _notes(rim, at, learns):
             alike.setdefault(one.replace(f" wheel {rim.wheel} ", _WHICH), []).append(rim.wheel)
     for one, wheels in alike.items():
@@ -93,6 +95,10 @@ def _require_driven(log: Recording, vehicle: Vehicle) -> None:
             hint=drive or "name its column in a profile, or correct 'driven' in the vehicle file",
             page="vehicle#signals-that-are-missing",
         )
+
+
+def _calibrated(rim: Rim, vehicle: Vehicle) -> bool:
+    return rim.wheel == DRIVE or rim.wheel in vehicle.calibration.wheel_radius
 
 
 def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:

@@ -293,7 +293,7 @@ def _column_summary(name: str, seen: Seen) -> ColumnSummary:
         if held is not None:
             fresh = fresh_samples(when, sample, held)
             when, sample = when[fresh], sample[fresh]
-        noise = white_noise(when, sample)
+        noise = white_noise(when, sample - middle)  # a latitude's is no part of 51 degrees
         rate = 1 / held if held is not None else count / _spanned(time, seen.whole)
     return ColumnSummary(
         name, "number", unit, count, 1 - count / rows, rate, held, noise, low, q05, middle, q95, high

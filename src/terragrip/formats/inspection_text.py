@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -117,8 +118,16 @@ def _row(column: ColumnSummary) -> tuple[str, ...]:
     rate = "" if column.rate is None else f"{column.rate:.3g} Hz"
     held = "" if column.held_period is None else f"{column.held_period:.3g} s"
     sizes = (column.minimum, column.quantile_05, column.median, column.quantile_95, column.maximum)
-    return (*head, rate, held, _number(column.noise), *(_number(size) for size in sizes))
+    return (*head, rate, held, _number(column.noise), *_apart(sizes))
 
 
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
+
+
+def _apart(sizes: Sequence[float | None]) -> list[str]:
+    """Minimum to maximum in four digits, or as many as a hundredth of their range needs (latitudes of one field)."""
+    known = [size for size in sizes if size is not None]
+    span = max(known, default=0.0) - min(known, default=0.0)
+    digits = 4 if span == 0 else max(4, math.ceil(math.log10(max(map(abs, known)) / span)) + 2)
+    return ["" if size is None else f"{size:.{digits}g}" for size in sizes]
