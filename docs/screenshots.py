@@ -51,6 +51,8 @@ def map_page(page: Any) -> None:
 
 def field(page: Any) -> None:
     page.wait_for_selector("#map[data-cells]")
+    page.select_option("#field-quantity", "soil_resistance")  # whose patches are anomalies
+    page.wait_for_selector(".anomalies li")
     page.focus(".maplibregl-canvas")
     page.keyboard.press("ArrowRight")
 

@@ -222,6 +222,16 @@ def test_a_tool_that_runs_up_is_a_push():
     assert len(result) >= 1
     assert 20 <= result[0].start < 20.3
     assert "pushes from behind" in result[0].why
+    assert ("drawbar force" in result[0].why, "soil resistance" in result[0].why) == (True, False)
+    gained = 3.0 * np.clip(log.time - 20, 0, 1)  # m/s, more than the wheels' thrust gives
+    unseen = {name: values for name, values in channels.items() if name != "drawbar_force"}
+    for name in unseen:
+        if name == "ground_speed" or name.startswith("wheel_speed"):
+            unseen[name] = unseen[name] + gained / (1 if name == "ground_speed" else vehicle.wheel_radius[0])
+    unseen["acceleration_x"] = unseen["acceleration_x"] + np.where(pushed, 3.0, 0.0)
+    table = estimate(Recording(time=log.time, channels=unseen), vehicle)
+    first = next(e for e in events(table) if e.kind == "push")
+    assert ("drawbar force" in first.why, "soil resistance, down to -" in first.why) == (False, True)
 
 
 def test_an_empty_table_has_no_events(soft):

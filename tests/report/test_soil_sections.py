@@ -132,6 +132,8 @@ def test_what_lacks_is_said_and_where_nothing_lacks_too(curves: list[SoilCurves]
     (table,) = tables(section)
     assert all(row[1].endswith("to 60 %") for row in table.rows)
     assert any("no data between" in sentence for sentence in section.prose)
+    pulls = [row[2].removesuffix(" N").split(" to ") for row in table.rows]
+    assert all(len(set(pull)) == len(pull) for pull in pulls)  # '870 to 870 N' is one
 
 
 def test_without_soils_each_section_says_why() -> None:

@@ -201,7 +201,7 @@ def comparison(library: SoilLibrary, other: SoilLibrary, path: Path | None) -> s
             f"intervals of {k} {'overlap' if v else 'do not overlap'}" for k, v in meet.items()
         )
         lines.append(
-            f"  {row['soil']}: {-row['mean']:+.3f} in the mean, {row['largest']:.3f} at most, to {row['to']:.0%} of slip"
+            f"  {row['soil']}: {round(-row['mean'], 3) + 0.0:+.3f} in the mean, {row['largest']:.3f} at most, to {row['to']:.0%} of slip"
             + (f"; {sentence}" if sentence else "")
         )
     return "\n".join(lines)

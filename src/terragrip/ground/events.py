@@ -114,11 +114,13 @@ def _stuck(estimates: Estimates, rows: Ints) -> str:
 def _push(estimates: Estimates, rows: Ints) -> str:
     limits = watch_limits()
     adhesion = float(np.nanmedian(_mean(estimates, "adhesion", rows)))
-    resistance = float(np.nanmin(estimates["soil_resistance"][rows]))
+    resistance, std = (estimates[name][rows] for name in ("soil_resistance", "soil_resistance_std"))
+    shows = f"the drawbar force is negative by more than {limits['push']:.1%} of the weight"
+    if np.nanmin(resistance + 2 * std) < 0:
+        shows = f"the soil resistance, down to {np.nanmin(resistance):.2f}, is negative by more than two standard deviations"
     return (
         f"The wheels pull (adhesion {adhesion:.2f} from the drive torques) but something pushes from behind, such as a tool that "
-        f"runs up: the drawbar force is negative by more than {limits['push']:.1%} of the weight, or the soil resistance, "
-        f"down to {resistance:.2f}, is negative."
+        f"runs up: {shows}."
     )
 
 

@@ -136,7 +136,7 @@ def section_points(
     table = Table(
         "Sections: vehicle and tool between two changes. The sensor's column is its F_x/F_z, which follows κ."
         + (f" The first {LISTED}." if sum(len(ground.sections) for ground in grounds) > LISTED else ""),
-        ("run, time", "taken for", "probability", "label", "slip", "adhesion", "sensor"),
+        ("run, time", "recognised as", "probability", "label", "slip", "adhesion", "sensor"),
         rows,
     )
     return Section("sections", title, (), (picture, table))

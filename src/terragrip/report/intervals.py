@@ -73,7 +73,7 @@ def draw_coverage(coverages: Sequence[Coverage]) -> str:
         plot.set_xlabel("stated probability of the interval")
         plot.set_ylabel("share of rows in which it covers the truth")
         plot.set_xlim(0.45, 1.0)
-        plot.legend(loc="upper left")
+        plot.legend(loc="lower right")
         return to_svg(figure)
 
 

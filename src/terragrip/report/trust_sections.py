@@ -50,7 +50,7 @@ def what_is_missing(curves: Sequence[SoilCurves], not_fitted: Mapping[str, str] 
         (
             one.name,
             f"{percent(gap.slip[0], 0)} to {percent(gap.slip[1], 0)}",
-            f"{number(max(gap.pull[0], 0), 0)} to {number(max(gap.pull[1], 0), 0)} N",
+            f"{' to '.join(dict.fromkeys(number(max(pull, 0), 0) for pull in gap.pull))} N",
             f"{number(gap.speed, 1)} m/s",
             f"{number(max(gap.seconds, 1), 0)} s",
             "yes" if gap.reachable else "no: the curve is flat or falls there",

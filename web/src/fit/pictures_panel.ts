@@ -151,7 +151,7 @@ export class PicturesPanel {
     const choice = h(
       "select",
       { "aria-label": "Open a picture from the folder" },
-      h("option", { value: "" }, more.length ? "Picture from the folder …" : "No more pictures in the folder"),
+      h("option", { value: "" }, more.length ? "Picture from the folder …" : this.files.length ? "No more in the folder" : "No pictures in the folder"),
       more.map((path) => h("option", { value: path }, path)),
     );
     choice.addEventListener("change", () => void (choice.value && this.open(choice.value)));
