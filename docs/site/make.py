@@ -65,8 +65,24 @@ CONTENTS: dict[str, list[str]] = {
         "glossary",
         "licences",
     ],
-    "Science": ["physics", "methods", "families", "families-history", "warning", "real-logs", "benchmarks"],
-    "Inside": ["architecture", "kernel", "tuned-numbers", "mutants", "decisions/README"],
+    "Science": [
+        "physics",
+        "methods",
+        "families",
+        "families-history",
+        "ground-history",
+        "warning",
+        "real-logs",
+        "benchmarks",
+    ],
+    "Inside": [
+        "architecture",
+        "architecture-history",
+        "kernel",
+        "tuned-numbers",
+        "mutants",
+        "decisions/README",
+    ],
 }
 """The site's table of contents. A page of docs/ that stands nowhere here is put at the end of the how-tos."""
 
