@@ -50,6 +50,8 @@ def test_quantities_that_the_file_knows_better_are_left_out(vehicle: Vehicle) ->
     )
     assert relative == []
     assert unknown[-1].why == "determined only to 2.5 %, but the vehicle file states 1 %: record more"
+    procedure._useful([quantity("drive_torque_gain", 1.0, 1.12)], stating(vehicle), unknown)
+    assert unknown[-1].why.startswith("determined only to 110 %, ")  # not 1.1e+02
     procedure._useful([quantity("drawbar_offset", 2.0, 0.05)], stating(vehicle, drawbar_offset=0.01), unknown)
     assert "determined only to 0.05 1, but the vehicle file states 0.01 1" in unknown[-1].why
 

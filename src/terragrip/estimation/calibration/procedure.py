@@ -287,7 +287,8 @@ def _useful(quantities: list[Quantity], vehicle: Vehicle, unknown: list[Unknown]
     if prior is None or max(errors) < prior:
         return quantities
     worst, known = (
-        f"{100 * x:.2g} %" if relative else f"{x:.2g} {quantities[0].unit}" for x in (max(errors), prior)
+        f"{float(f'{100 * x:.2g}'):g} %" if relative else f"{x:.2g} {quantities[0].unit}"
+        for x in (max(errors), prior)
     )
     unknown.append(
         Unknown(key, f"determined only to {worst}, but the vehicle file states {known}: record more")
