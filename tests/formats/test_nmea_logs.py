@@ -77,6 +77,29 @@ def test_speeds_without_a_time_are_counted(tmp_path: Path) -> None:
         assert [note.partition(":")[0] for note in table.notes] == list(expected)
 
 
+def test_what_a_receiver_reckons_without_satellites_is_no_measurement(tmp_path: Path) -> None:
+    """Under trees it goes on by dead reckoning, by the wheels' speeds even: of that slip was made, without a word."""
+    place = ("5103.0000", "N", "01344.0000", "E")
+    for mode, quality, count in (("A", "1", 6), ("D", "4", 6), ("", "2", 6), ("E", "6", 3), ("S", "8", 3)):
+        lines = []
+        for k in range(6):
+            now = mode if k > 2 else "A"
+            clock, gga = (
+                f"1200{k:02d}.00",
+                (*place, quality if k > 2 else "4", "9", "1", "9", "M", "44", "M", "", ""),
+            )
+            rmc = ("A", *place, "2.0", "90.0", "211126", "", "", *[now] * (now != ""))
+            lines.append(str(pynmea2.RMC("GN", "RMC", (clock, *rmc))))
+            lines.append(str(pynmea2.VTG("GN", "VTG", ("90.0", "T", "", "M", "2.0", "N", "3.7", "K", now))))
+            lines.append(str(pynmea2.GGA("GN", "GGA", (clock, *gga))))
+        (tmp_path / "gnss.nmea").write_text("\n".join(lines) + "\n")
+        table = read_table(tmp_path / "gnss.nmea")
+        assert np.isfinite(table.columns["ground_speed"]).sum() == count
+        assert np.isfinite(table.columns["latitude"]).sum() == count
+        expected = [] if count == 6 else ["9 sentences have no fix: their values are missing."]
+        assert [note for note in table.notes if "fix" in note] == expected
+
+
 def test_nmea_runs_past_midnight(tmp_path: Path) -> None:
     clocks = ("235959.50", "000000.00", "000000.50")
     gga = ("5103.0000", "N", "01344.0000", "E", "4", "12", "0.8", "110.5", "M", "44.0", "M", "", "")

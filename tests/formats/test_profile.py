@@ -142,6 +142,38 @@ def test_rows_are_selected(foreign: pd.DataFrame) -> None:
         Profile.from_dict(data).apply(foreign)
 
 
+@pytest.mark.parametrize(
+    ("header", "source", "value"),
+    [
+        ("M [kNm]", {"from": "M", "scale": 0.5, "unit": "kN m"}, 2000.0),
+        ("M [kNm]", {"from": "M", "scale": 500, "unit": "N m"}, 2000.0),
+        ("M [kNm]", {"from": "M", "scale": 1000}, 4000.0),
+        ("M [Nm]", {"from": "M", "scale": 0.5}, 2.0),
+        ("M [A]", {"from": "M", "scale": 0.5}, 2.0),
+        ("M [kNm]", {"from": "M", "scale": -1}, -4000.0),
+        ("M [kNm]", {"sum_of": {"M": 1, "back": -1}}, 3000.0),
+        ("M [kNm]", {"from": "M", "scale": 0.5}, None),
+        ("M [kNm]", {"sum_of": {"M": 0.5, "back": -0.5}}, None),
+    ],
+)
+def test_a_scale_beside_the_logs_own_unit_is_not_guessed_at(
+    tmp_path: Path, header: str, source: dict[str, object], value: float | None
+) -> None:
+    """An axle's torque in kNm by the header, half of it for each wheel: the unit was dropped, and adhesion a thousandth."""
+    (tmp_path / "log.csv").write_text(
+        f"time [s],v [m/s],back [kNm],{header}\n" + "".join(f"{k},1,1,4\n" for k in range(5))
+    )
+    channels = {"ground_speed": "v", "wheel_speed_fl": {"constant": 1.0}, "drive_torque_fl": source}
+    profile = Profile.from_dict({"channels": channels})
+    if value is not None:
+        assert read(tmp_path / "log.csv", profile)["drive_torque_fl"] == pytest.approx(np.full(5, value))
+        return
+    with pytest.raises(
+        InputError, match=r"channel drive_torque_fl: is in kNm by the log.*write 'unit: kNm' beside"
+    ):
+        read(tmp_path / "log.csv", profile)
+
+
 def test_a_unit_that_the_log_states_is_used(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,speed [km/h],left [rpm],amps [A]\n0,3.6,60,2\n1,7.2,60,2\n")

@@ -102,6 +102,20 @@ def test_a_tool_that_comes_in_or_out_at_once_and_a_vehicle_that_coasts_are_no_er
     assert notes(coasting, vehicle) == []
 
 
+def test_a_drive_that_answers_a_tool_by_a_leap_is_no_moved_zero(vehicle: Vehicle) -> None:
+    """A tool drops in at 60 s, onto ground that resists by .06 more; .1 s later the torques leap, by less than the pull: 'drive_torque_rl,
+    drive_torque_rr leap ... their zero moved' came on 2 of 30 right logs of an outsider's tractors."""
+    columns, weight = drive(vehicle, np.zeros(len(TIME))), vehicle.mass * G
+    columns["drawbar_force"] += 0.1 * weight * (TIME > 59.99)
+    softer = 0.06 * weight * np.clip((TIME - 60) / 0.3, 0, 1)
+    thrust = weight * np.interp(TIME, [60.08, 60.09, 60.3, 60.6], [0, 0.06, 0.1, 0.16])
+    columns["ground_speed"] += (
+        np.cumsum(thrust - softer - 0.1 * weight * (TIME > 59.99)) * 0.05 / vehicle.mass
+    )
+    columns |= {name: columns[name] + thrust * RADIUS / 4 for name in TORQUES}
+    assert leap_warnings(Recording.from_frame(columns), vehicle) == []
+
+
 def test_a_start_into_softer_ground_is_no_moved_zero(
     vehicle: Vehicle,
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from development_machine import machine
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.mechanics import means_of
-from terragrip.recording.rolling import light_warnings
+from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.simulation import SimulationResult, families
 from terragrip.vehicle import Vehicle
 
@@ -98,6 +98,27 @@ def test_a_speed_that_is_wrong_in_a_part_of_the_drive_is_named(
     assert note.startswith("From 30.52 to 58.52 s the rims of " + rims + " go slower than their hubs")
     off = {n: np.where(late, -v if n.startswith("drive_torque") else v, v) for n, v in straight.items()}
     assert not any("go slower" in n for n in unit_warnings(Recording.from_frame(off | wrong), vehicle))
+
+
+@pytest.mark.parametrize(("shared", "said"), [(True, False), (False, True)])
+def test_the_outer_rim_of_a_locked_axle_is_no_error_in_a_turn(
+    columns: dict[str, np.ndarray], vehicle: Vehicle, shared: bool, said: bool
+) -> None:
+    """It brakes there, and the inner one pulls for both; of one torque for both 'the rims of rr go slower than their hubs' came on a right
+    log of an outsider's tractor. With a torque of its own, a wheel that pulls has no slower rim."""
+    turn = np.where((columns["time"] > 20) & (columns["time"] < 40), 0.2 * columns["ground_speed"], 0.0)
+    hub = {w: columns["ground_speed"] + (turn if w.endswith("r") else -turn) for w in vehicle.wheels}
+    moved = {
+        f"wheel_speed_{w}": columns[f"wheel_speed_{w}"] * hub[w] / columns["ground_speed"]
+        for w in ("fl", "fr")
+    }
+    moved["angular_velocity_z"] = 2 * turn / 0.6
+    if shared:
+        moved["drive_torque_rr"] = columns["drive_torque_rl"]
+    tracked = Vehicle.from_dict(vehicle.to_dict() | {"track": 0.6})
+    recording = Recording.from_frame(columns | moved)
+    notes = slower_warnings(recording, tracked, means_of(recording, tracked), moved["angular_velocity_z"])
+    assert any("rims of rr go slower" in note for note in notes) is said
 
 
 def test_the_inner_rims_of_a_bend_that_only_the_rims_show_are_no_error(

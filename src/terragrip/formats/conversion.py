@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 Column = npt.NDArray[Any]
 _CRAB = np.radians(10.0)  # beside a heading: the speed along it is 2 % less than that of the path
 _TOGETHER = 0.8  # path and heading, which keep one angle
+_CONVERTED = 0.01  # a scale so near the factor of the log's unit is that factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,22 +232,35 @@ def _factor(name: str, origin: Source, log: LogTable) -> float:
         return 1.0
     if origin.unit is not None:
         return factor_to(rate_unit(origin.unit) if origin.derivative_of else origin.unit, target)
-    plain = origin.scale == 1.0 and origin.over is None and set((origin.sum_of or {}).values()) <= {1.0}
+    factors = {abs(origin.scale * factor) for factor in (origin.sum_of or {"": 1.0}).values()}
+    plain = factors == {1.0} and origin.over is None
     every = {log.units.get(column) for column in origin.sum_of or (str(origin.column),)}
     if len(every) > 1 and plain:
         hint = "give each its factor, and the sum a unit: 'sum_of: {a: 1, b: 1000}, unit: N'"
         place = f"columns {', '.join(origin.columns)}"
         raise InputError("are of unlike units", file=log.source, place=place, hint=hint)
-    stated = every.pop() if plain else None
+    stated = every.pop() if len(every) == 1 and origin.over is None else None
     if stated is None:
         return 1.0
     try:
-        return factor_to(stated, target)
+        factor = factor_to(stated, target)
     except UnitError as error:
+        if not plain:  # the scale is a torque constant, say: amperes to newton metres
+            return 1.0
         hint = f"give {name} a unit or a scale in the profile"
         raise InputError(
             error.problem, file=log.source, place=f"column {', '.join(origin.columns)}", hint=hint
         ) from error
+    if plain or abs(factor - 1.0) < _CONVERTED:
+        return factor
+    if all(abs(part / factor - 1.0) < _CONVERTED for part in factors):
+        return 1.0
+    raise InputError(
+        f"is in {stated} by the log, and scaled besides: nothing shows whether that converts it to {target}",
+        file=log.source,
+        place=f"channel {name}",
+        hint=f"write 'unit: {stated}' beside the scale if the log's unit still counts, 'unit: {target}' if the scale converts it",
+    )
 
 
 def _between(time: Floats, values: Floats) -> Floats:

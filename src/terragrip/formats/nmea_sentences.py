@@ -35,12 +35,14 @@ UNITS = {
     "satellites": None,
 }
 
+_UNMEASURED = (None, 0.0, 6.0, 7.0, 8.0)  # qualities of GGA: none, reckoned, typed in, simulated
+
 
 @dataclass(frozen=True, slots=True)
 class Sentence:
     """``kind`` is RMC, VTG or GGA; ``clock`` and ``date`` are UTC, where it holds them.
 
-    ``fields`` [`UNITS`]: what it holds of them; none without a fix.
+    ``fields`` [`UNITS`]: what it holds of them; none without a fix by satellites.
     """
 
     kind: str
@@ -84,9 +86,11 @@ def _read(kind: str, sentence: Any) -> Sentence:
 
 
 def _has_fix(kind: str, sentence: Any) -> bool:
-    if kind == "RMC":
-        return bool(sentence.status == "A")
-    return getattr(sentence, "faa_mode", "A") != "N" if kind == "VTG" else bool(_number(sentence.gps_qual))
+    """Whether a sentence was measured: what a receiver reckons without satellites (mode E, quality 6) may come from the wheels' speeds."""
+    if kind == "GGA":
+        return _number(sentence.gps_qual) not in _UNMEASURED
+    mode = (sentence.mode_indicator if kind == "RMC" else sentence.faa_mode) or "A"
+    return mode not in ("N", "E", "M", "S") and (kind == "VTG" or sentence.status == "A")
 
 
 def _number(value: Any, factor: float = 1.0) -> float | None:

@@ -122,6 +122,11 @@ def _unanswered(
     leap = np.sum(list(leaps.values()), axis=0)
     rows = drive.inside & (np.abs(leap) > least) & (np.abs(left - leap) < _REST * np.abs(leap))
     rows &= np.abs(drive.unmoved(force, _SOON) - leap) < _HALF * np.abs(leap)
+    # A tool that comes in or out leaps, and the drive answers by a leap a little later.
+    total, first = np.r_[0.0, np.cumsum(leap)], np.searchsorted(drive.middle, drive.middle - _SOON)
+    rows &= np.abs(
+        total[np.searchsorted(drive.middle, drive.middle + _SOON)] - total[first] - leap
+    ) < _HALF * np.abs(leap)
     found: dict[tuple[str, ...], list[int]] = {}
     for k in np.flatnonzero(rows):
         found.setdefault(tuple(name for name in parts if leaps[name][k]), []).append(int(k))

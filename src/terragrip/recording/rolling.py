@@ -155,12 +155,16 @@ def slower_warnings(
     measured = np.isfinite(ground)
     noise = vehicle.sensors.ground_speed or white_noise(recording.time[measured], ground[measured]) or 0.0
     found: dict[str, tuple[float, float]] = {}
+    wheels: dict[str, tuple[Floats, Floats]] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
-        if spin is None or torque is None:
-            continue
-        rim = radius * window_means(spin, means.place, means.count)[means.rows]
-        hub, thrust = means.speed - slowed[wheel], means.of(torque) / radius
+        if spin is not None and torque is not None:
+            rim = radius * window_means(spin, means.place, means.count)[means.rows]
+            wheels[wheel] = torque, np.array([rim, means.speed - slowed[wheel], means.of(torque) / radius])
+    for wheel, (torque, _) in wheels.items():
+        # How wheels share one signal was not measured: behind a lock the outer one brakes in a turn.
+        alike = [state for other, state in wheels.values() if np.array_equal(other, torque, equal_nan=True)]
+        rim, hub, thrust = np.mean(alike, axis=0)
         rows = (hub - rim > slower * hub) & (thrust > least) & usable
         stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
         if stretch is None:
