@@ -203,7 +203,8 @@ def _verdict(
         return "left open", f"was {truth[channel][0][0]}"
     columns = sorted(_bare(c) for c in made.columns)
     ways, unit = truth.get(channel, ([], None))
-    same = any(columns == sorted(_bare(c) for c in way) for way in ways)
+    as_read = sorted(made.columns)  # the reader has the unit off: Speed (OBD) of Speed (OBD)(km/h)
+    same = any(sorted(_bare(c) for c in way) in (columns, as_read) for way in ways)
     right = same and (unit is None or channel == TIME or _alike(made.unit, unit))
     sentence = (
         f"{made.columns} in {made.unit}"

@@ -64,6 +64,7 @@ _TURNS_A_MINUTE = re.compile(
 _OF_TURNS = re.compile(r"\s*(?:[kM]?(?:Hz|hertz)|1\s*/\s*s(?:ec)?|s\s*\^?\s*-\s*1|s\s*⁻¹)\s*")
 """What could be radians or turns a second: DIN 1301-2 writes speeds of rotation in turns as 1/s."""
 _GRAVITY = (0, 1, -2, 0)
+_OF_GRAVITY = {"g": STANDARD_GRAVITY, "G": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1000}
 _POWER = re.compile(r"(?<=[a-z°])(-[1-4]|[234])(?![\d.])")
 """``m/s2``, ``m s-1``: an exponent without its sign of a power."""
 _TOKEN = re.compile(r"\s*(?:(\*\*|\^)\s*\(?([+-]?\d+)\)?|([*/])|([A-Za-z%‰°µ][A-Za-z0-9_%‰°µ]*|1))")
@@ -127,12 +128,13 @@ def may_be_turns(text: str) -> bool:
 def factor_to(text: str, si_unit: str) -> float:
     """Factor that takes a number in unit ``text`` to ``si_unit``; raises UnitError if they are unlike.
 
-    ``g`` stands for standard gravity where an acceleration is asked for, and a mass for its weight where a force is: kg, lb ft. Hz
-    and 1/s are refused for an angular velocity, since they could mean rad/s or revolutions per second, and grad for an angle.
+    ``g`` stands for standard gravity where an acceleration is asked for, ``mg`` for a thousandth of it, and a mass for its weight
+    where a force is: kg, lb ft. Hz and 1/s are refused for an angular velocity, since they could mean rad/s or revolutions per second,
+    and grad for an angle.
     """
     target = parse_unit(si_unit)
-    if text.strip() in ("g", "G") and target.dimension == _GRAVITY:
-        return STANDARD_GRAVITY
+    if text.strip() in _OF_GRAVITY and target.dimension == _GRAVITY:
+        return _OF_GRAVITY[text.strip()] / target.factor
     if "rad" in si_unit and may_be_turns(text):
         raise UnitError(f"{text.strip()!r} is ambiguous for an angular velocity", "write rad/s, deg/s or rpm")
     if text.strip().partition("/")[0] == "grad":

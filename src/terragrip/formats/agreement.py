@@ -39,7 +39,7 @@ class Agreement:
         self._accelerations(ranked)
         self._turning(ranked)
         Rims(self._evidence, self._vehicle).judge(
-            ranked, self._ground(ranked), path, self._turns_of_body(ranked)
+            ranked, self._ground(ranked), path, self._turns_of_body(ranked), self._assumed(ranked)
         )
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
@@ -148,9 +148,16 @@ class Agreement:
         if guess.column.name.has("wheel", "odometry") or guess.confidence >= 0.9:
             return guess
         result = self._evidence.ratio(ground.column.column, guess.column.column)
-        if result is None or not (result[1] > 0.5 and 0.6 < result[0] < 1.4):
+        if result is None:
             return None
-        sentence = f"varies with {ground.column.column}, of which it is {1 / result[0]:.3g} times"
+        stated = guess.column.unit is not None and ground.column.unit is not None
+        scale = (
+            factor_to(ground.unit or "m/s", "m/s") / factor_to(guess.unit or "m/s", "m/s") if stated else 1.0
+        )
+        share = 1 / (result[0] * scale)
+        if not (result[1] > 0.5 and 0.7 < share < 1.7):
+            return None
+        sentence = f"varies with {ground.column.column}, of which it is {share:.3g} times"
         doubt = "the wheels' own speed, beside one over ground?" if guess.column.name.strange else ""
         return replace(guess, confidence=0.6, evidence=(*guess.evidence, sentence), doubt=doubt)
 
@@ -162,6 +169,15 @@ class Agreement:
         if (best.doubt or best.unit_doubt) and best.column.unit is None:
             return None
         return best.column.column, factor_to(best.unit, "m/s")
+
+    def _assumed(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
+        """The best ground speed and its factor to m/s in its likely unit, though nothing states it."""
+        best = surest(ranked, "ground_speed")
+        return (
+            None
+            if best is None or best.unit is None or best.doubt
+            else (best.column.column, factor_to(best.unit, "m/s"))
+        )
 
     def _accelerations(self, ranked: Ranked) -> None:
         """Accelerations by gravity in the sum of three, and along the vehicle by the derivative of its speed."""

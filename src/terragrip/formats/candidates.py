@@ -57,6 +57,7 @@ class Candidate(NamedTuple):
 _WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "icp"})
 """Odometry by these does not look at the wheels; the profile ros2-4wd takes it for ground speed, too."""
 _SLOPES = frozenset({"slope", "incline", "inclination", "steigung", "pente", "pendiente", "pendenza"})
+_GEARBOX = frozenset({"gearbox", "transmission", "getriebe"})
 _FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
 _ALONG = {"longitudinal": "x", "lateral": "y", "vertical": "z"}
 _ABOUT = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -149,11 +150,18 @@ def _by_name(column: Column) -> list[Candidate]:
         and not column.name.has("command", "statistic", "odometry")
     ):
         return [Candidate(last, 1.0, "Terragrip's own name")]
-    standard = _on_the_bus().get(last)
+    standard = _on_the_bus().get(last) or _on_the_bus().get(_written_out(last))
     if standard is not None:
         return [Candidate(standard, 0.95, ON_THE_BUS)]
     if _BRAKE.search("".join(column.name.words)) and not column.name.has("command"):
         return [Candidate("brake", 0.7, "a brake's switch or pedal")]
+    of_gearbox = not _GEARBOX.isdisjoint(column.name.words) and not column.name.has("command", "statistic")
+    if (
+        of_gearbox
+        and column.name.has("speed")
+        and (column.kind == "speed" or column.name.has("ground", "body"))
+    ):
+        return [Candidate("wheel_based_speed", 0.6, "a speed of the vehicle, by its gearbox")]
     if column.name.has("command", "statistic", "change", "other"):
         return []
     ways = (_of_wheels, _of_motion, _of_place, _of_speed)
@@ -167,10 +175,13 @@ def _first(*rules: tuple[object, str, float, str]) -> list[Candidate]:
 
 def _of_wheels(column: Column) -> list[Candidate]:
     name, wheel, of_wheel = column.name, column.name.wheel, column.name.has("wheel")
-    if not wheel or name.axis or name.has("ground", "odometry", "gyro", "acceleration", "position", "rate"):
+    if not wheel or name.axis or name.has("ground", "odometry", "gyro", "acceleration", "position", "angle"):
         return []
+    if name.has("rate") and (name.has(*_ABOUT, "heading") or not (of_wheel or name.has("speed", "rotation"))):
+        return []  # of the body; a wheel's angular velocity is its speed
     turning = (
         name.has("speed", "rotation")
+        or (of_wheel and name.has("rate"))
         or (name.has("wheel", "motor") and column.kind in ("speed", "rotation"))
         or (wheel[-1] in "lr" and column.kind == "rotation" and _in_turns(column.unit))  # WS_FL [rpm]
     ) and not (name.has("body") and wheel.isdigit())
@@ -195,6 +206,7 @@ def _of_motion(column: Column) -> list[Candidate]:
             (True, "acceleration_x", 0.4, "an acceleration, along an unknown axis"),
         )
     rate, gyro = name.has("rate"), f"angular_velocity_{axis}"
+    body = not name.has("wheel", "motor") and not column.one_of_several
     angular = axis and (name.has("gyro") or (rate and (name.has("speed") or "twist" in name.words)))
     turns = column.kind == "rotation" and not name.wheel and not name.has("wheel", "motor")
     by_unit = column.kind == "acceleration"
@@ -204,11 +216,21 @@ def _of_motion(column: Column) -> list[Candidate]:
     angle &= not (slope and name.axis)  # inclination_x: along it, or about it
     by_angle = (0.7, "a slope") if slope else (0.85, "its name")
     return _first(
-        (rate and about and not axis, f"angular_velocity_{about}", 0.85, "the rate of an angle"),
+        (
+            about and not axis and name.has("rate", "speed"),
+            f"angular_velocity_{about}",
+            0.85,
+            "the rate of an angle",
+        ),
         (angular and name.has("odometry"), gyro, 0.6, "odometry's rate of turn and an axis"),
         (angular, gyro, 0.85, "a gyro and an axis"),
         (axis and rate and not name.has("position"), gyro, 0.7, "a rate and an axis"),
-        (rate and "turn" in name.words, "angular_velocity_z", 0.55, "a rate of turn"),
+        (
+            rate and body and (name.has("speed") or "turn" in name.words),
+            "angular_velocity_z",
+            0.55,
+            "a rate of turn",
+        ),
         (axis and turns, gyro, 0.6, "turns about an axis"),
         (axis and by_unit, f"acceleration_{axis}", 0.6, "an acceleration by its unit, and an axis"),
         (alone, "angular_velocity_z", 0.3, "turns, of an unknown part"),
@@ -303,12 +325,18 @@ def _tractor() -> Profile:
 @cache
 def _on_the_bus() -> dict[str, str]:
     """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
-    return {name: channel for channel, source in _tractor().channels.items() for name in source.candidates}
+    names = {name: channel for channel, source in _tractor().channels.items() for name in source.candidates}
+    return names | {_written_out(name): channel for name, channel in names.items()}
+
+
+def _written_out(name: str) -> str:
+    """A signal's name as one word in lower case, without its unit: Actual Engine - Percent Torque (%)."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name).lower())
 
 
 def _last(column: str) -> str:
     """A column's name inside its struct or message."""
-    return re.split(r"[./]", column)[-1]
+    return re.split(r"[./]|::", column)[-1]
 
 
 def _root(column: str) -> str:

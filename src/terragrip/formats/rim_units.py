@@ -62,6 +62,12 @@ class RimUnit:
             and _is_usual(self.unit, self.possible[self.unit])
         )
 
+    @property
+    def contradicts_own(self) -> bool:
+        """Whether rad/s, the unit of Terragrip's own names, is unlikely, and another usual unit is likely."""
+        usual = [unit for unit, share in self.possible.items() if _is_usual(unit, share)]
+        return bool(usual) and "rad/s" not in usual
+
     def sentence(self, radius: float) -> str:
         """What was found, by the ``radius`` [m] of a wheel."""
         if not self.possible:
@@ -73,7 +79,8 @@ class RimUnit:
 
     def judge(self, guess: Guess, radius: float) -> Guess:
         """The guess with this unit: surer where no other is possible, with a question mark where one is."""
-        if guess.column.column == guess.channel and "rad/s" in self.possible:  # by our own name it is rad/s
+        is_own = guess.column.column == guess.channel
+        if is_own and "rad/s" in self.possible and not self.contradicts_own:  # by our own name it is rad/s
             own = RimUnit(self.ground, {"rad/s": self.possible["rad/s"]})
             return guess.with_finding(Finding(True, own.sentence(radius), "rad/s"))
         sentence = self.sentence(radius)

@@ -10,7 +10,7 @@ import numpy as np
 from terragrip.formats.candidates import kind_of
 from terragrip.formats.evidence import RADII, Evidence, Finding, Path, Series, nearest_unit, sizes, slope_of
 from terragrip.formats.judgement import Guess
-from terragrip.formats.rim_units import POSSIBLE, lightest_share, radius_of, rim_unit, speeds_of
+from terragrip.formats.rim_units import POSSIBLE, RimUnit, lightest_share, radius_of, rim_unit, speeds_of
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -40,9 +40,17 @@ class Rims:
         self._vehicle = vehicle
 
     def judge(
-        self, ranked: Ranked, ground: Ground | None, paths: list[Way], turns: list[tuple[str, Series]]
+        self,
+        ranked: Ranked,
+        ground: Ground | None,
+        paths: list[Way],
+        turns: list[tuple[str, Series]],
+        assumed: Ground | None = None,
     ) -> None:
-        """Judge by the vehicle's radius or the one that follows from the ground speed or the path, by the others, and by the track."""
+        """Judge by the vehicle's radius or the one that follows from the ground speed or the path, by the others, and by the track.
+
+        ``assumed``: a ground speed of a likely unit, by which wheels of our own names may but get a doubt.
+        """
         channels = [c for c in ranked if c.startswith("wheel_speed_")]
         alike = self._without_unit(ranked, channels)
         by_radius = (
@@ -59,6 +67,8 @@ class Rims:
                 else self._against_way(g, ground, paths)
                 for g in ranked[channel]
             ]
+        if ground is None and assumed is not None and self._vehicle is not None and alike:
+            self._against_assumed(ranked, rim_unit(self._evidence, self._vehicle, alike, assumed, []))
         self._as_the_others(ranked, channels)
         for left, right in (("l", "r"), ("fl", "fr"), ("rl", "rr")):
             self._track(ranked, f"wheel_speed_{left}", f"wheel_speed_{right}", turns)
@@ -67,6 +77,19 @@ class Rims:
                 g.with_finding(self._as_fast(g, *ground)) if g.column.column != ground[0] else g
                 for g in ranked.get("wheel_based_speed", [])
             ]
+
+    def _against_assumed(self, ranked: Ranked, by_assumed: RimUnit | None) -> None:
+        """A doubt on wheels of our own names that are in another unit than rad/s if the ground speed is in its likely one."""
+        if by_assumed is None or not by_assumed.contradicts_own:
+            return
+        for channel, guesses in ranked.items():
+            radius = radius_of(self._vehicle, channel.removeprefix("wheel_speed_"))
+            if channel.startswith("wheel_speed_") and radius is not None:
+                doubt = f"{by_assumed.sentence(radius)}, if that is in m/s"
+                ranked[channel] = [
+                    replace(g, unit_doubt=doubt) if g.column.column == channel and not g.column.unit else g
+                    for g in guesses
+                ]
 
     def _without_unit(self, ranked: Ranked, channels: list[str]) -> dict[str, str]:
         """Of wheels whose radius is known, the columns that give no unit of their own."""

@@ -19,6 +19,8 @@ _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
 _FINER = ("s", "ms", "us", "ns")
 _DAYS = (3e4, 8e4)  # of a spreadsheet: 1982 to 2119; or seconds of a day,
 _DAY_STEP = 2e-4  # whose rows are never as close: 17 s in days
+_ALONE = (("ms",), ("us",), ("ns",))
+_ROUND = 60.0
 _FIELD_RATE = 5.0  # s between samples: no log of a drive has more
 
 
@@ -79,10 +81,8 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         own = stated if stated is not None and kind_of(stated) == "time" else None
         own, doubt = _unit(known, own)
         return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, own, doubt
-    unit = next(
-        (u for u in (stated, name.unit, _unit_word(name.words, vocabulary)) if u and kind_of(u) == "time"),
-        None,
-    )
+    units = (stated, name.unit, _unit_word(name.words, vocabulary), *name.words[:1] * (name.words in _ALONE))
+    unit = next((u for u in units if u and kind_of(u) == "time"), None)
     if (
         not (name.has("time") or words & {"t", "ts"} or unit)
         or name.has("statistic", "command", "distance", "speed")
@@ -91,6 +91,9 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         return 0.0, "s", ""
     if stated is not None and kind_of(stated) != "time":
         return 0.0, "s", ""
+    back = -float(np.min(np.diff(known)))
+    if back > 0.5 * (np.max(known) - np.min(known)) and np.max(known) < _ROUND and np.min(known) >= 0:
+        return 0.0, "s", ""  # the seconds of a minute, the minutes of an hour
     forward, level = _forward(known), float(np.mean(np.diff(known) >= 0))
     if forward < 0.5 and (level < 0.95 or known[-1] <= known[0]):
         return 0.0, "s", ""

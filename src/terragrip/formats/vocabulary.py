@@ -12,88 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from terragrip.formats.words import CORNERS, FRENCH, FRENCH_CORNERS, MEANINGS, UNIT_WORDS
 from terragrip.units import is_common
 
-MEANINGS: dict[str, str] = {
-    # what is measured
-    "speed": "speed velocity vel spd v sog geschwindigkeit vitesse velocidad velocita snelheid",
-    "rotation": "rpm rps omega w rotation drehzahl toerental regime",
-    "torque": "torque effort moment drehmoment tau tq trq md couple par coppia koppel",
-    "current": "current curr amps amp ampere strom",
-    "acceleration": "acceleration accelerometer acc accel beschleunigung aceleracion accelerazione versnelling",
-    "gyro": "gyroscope gyro gyr",
-    "rate": "rate angular turn",
-    "pitch": "pitch assiette nick nickwinkel neigung tangage cabeceo beccheggio slope incline inclination steigung pente "
-    "pendiente pendenza",
-    "roll": "roll bank wank wankwinkel querneigung roulis balanceo rollio",
-    "yaw": "yaw psi gier lacet imbardata",
-    "heading": "heading hdg course bearing azimuth cog compass",
-    "latitude": "latitude breitengrad",
-    "longitude": "longitude laengengrad",
-    "altitude": "altitude alt height elevation hoehe",
-    "position": "position pose pos easting northing utm",
-    "pull": "drawbar draft draught pull traction tractive zugkraft traino tiro trekkracht fdraw fzug ftow fpull",
-    "coupling": "hitch towing trailer attelage koppelpunkt hook haken deichsel coupler",
-    "force": "force kraft fuerza forza",
-    "mass": "mass weight masse gewicht poids peso massa",
-    "distance": "distance odometer",
-    "time": "time timestamp stamp unix epoch clock utc zeit uhrzeit temps heure tiempo hora tempo tijd tow "
-    "zeitstempel horodatage",
-    # what it is of
-    "wheel": "wheel whl rim tire tyre joint roue rueda ruota wiel axle achse essieu eje assale rad theoretical theorique "
-    "theoretisch theoretische teorica teorico radumfangs",
-    "motor": "motor moteur motore antrieb antriebs esc drive",
-    "ground": "ground gnd gps gnss radar navigation visual vio lidar icp doppler true location rtk ublox slam "
-    "grund boden sol suelo suolo",
-    "body": "vehicle machine car robot body base ego tractor gross gesamt fahrzeug fzg obd avancement",
-    "odometry": "odom odometry",
-    "soil": "soil terrain surface",
-    "other": "engine pto shaft driveshaft fan pump gearbox transmission battery brake steering steer throttle pedal ignition fuel "
-    "oil coolant boost wind magnetometer magnetic mag camshaft injector injection turbo clutch compressor alternator carrier "
-    "pseudorange satellite cylinder gear intake exhaust propeller idle encoder limiter bumper cliff charger gravity "
-    "air diff lock limiting ecef hydraulic valve grinder blade reel auger spool lever joystick crank zapfwelle zapfwellen lenkwinkel "
-    "getriebe rocker bogie boom bucket header cutter cutterbar mast crane ride gestaenge ausleger schneidwerk hubwerk hubwerks hubhoehe "
-    "suspension akku batterie brems bremse bremsen frein freno",
-    # what is no measurement of it
-    "command": "cmd command commanded set setpoint target desired reference ref demand demanded requested request limit max "
-    "maximum min minimum nominal available expected predicted ideal selected soll sollwert planned "
-    "consigne consigna objetivo obiettivo trgt tgt dmd setpt setp goal ff feedforward cruise",
-    "statistic": "std stddev var cov covariance variance accuracy error sigma uncertainty quality dop hdop vdop pdop status state "
-    "flag id identifier count counter index idx raw mode valid fix number checksum seq ticks pwm voltage volt temperature "
-    "temp pressure power load derivative correction offset trim level duty percent pct jerk energy frequency slip confidence "
-    "bias deviation scale ratio gain residual label relative rlv rel magnitude norm total wear",
-    # along which axis
-    "longitudinal": "longitudinal forward fwd laengs",
-    "lateral": "lateral side sideways transverse quer",
-    "vertical": "vertical vert down up climb sink",
-    "east": "east easting",
-    "north": "north northing",
-    "left": "left l li links gauche izquierda izquierdo sinistra sinistro",
-    "right": "right r re rechts droite derecha derecho destra destro",
-    "front": "front vorn vorne vorder avant delantera delantero anteriore voor",
-    "rear": "rear back hinten hinter arriere trasera trasero posteriore achter",
-    "middle": "middle mid centre center mitte mittig milieu medio centrale midden",
-    "change": "delta d",
-}  # fmt: skip
-_CORNERS = {
-    **dict.fromkeys(("fl", "lf", "vl"), "fl"), **dict.fromkeys(("fr", "rf", "vr"), "fr"),
-    **dict.fromkeys(("rl", "lr", "bl", "hl"), "rl"), **dict.fromkeys(("rr", "br", "hr"), "rr"),
-    **dict.fromkeys(("ml", "lm"), "ml"), **dict.fromkeys(("mr", "rm"), "mr"),
-}  # fmt: skip
-_FRENCH_CORNERS = {"avg": "fl", "avd": "fr", "arg": "rl", "ard": "rr"}
-_FRENCH = ("roue", "roues", "couple", "couples", "vitesse", "vitesses", "regime", "regimes")
-"""Beside one of these words ``avg`` is *avant gauche*; elsewhere it is an average."""
-UNIT_WORDS = {
-    "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
-    "dps": "deg/s", "degs": "deg/s", "rads": "rad/s", "deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad",
-    "radians": "rad", "nm": "N m", "knm": "kNm", "n": "N", "m": "m", "meter": "m", "meters": "m", "metres": "m", "mm": "mm",
-    "cm": "cm", "g": "g", "ms2": "m/s^2", "mss": "m/s^2", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "second": "s",
-    "millisecond": "ms", "microsecond": "us", "nanosecond": "ns",
-    "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
-    "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
-    "percent": "%", "pct": "%", "kg": "kg", "lbs": "lbs", "lbf": "lbf", "klbf": "klbf", "kip": "kip", "kips": "kip",
-    **dict.fromkeys(("lbft", "ftlb", "ftlbs", "lbfft", "ftlbf"), "lbf ft"), **dict.fromkeys(("inlb", "inlbs", "lbin", "inlbf"), "lbf in"),
-}  # fmt: skip
 _ALWAYS = ("rpm", "rps", "kmh", "kph", "kmph", "mph", "mps")  # mean a unit wherever they stand
 _MOMENTS = {"n m": "N m", "kn m": "kN m"} | {
     text: f"{force} {lever}"
@@ -101,6 +22,7 @@ _MOMENTS = {"n m": "N m", "kn m": "kN m"} | {
     for lever in ("ft", "in")
     for text in (f"{force} {lever}", f"{lever} {force}")
 }
+_HOURS = {"hour": "h", "hr": "h", "h": "h"}
 _PER = re.compile(r"(?!mph)(km|m|mm|cm|mi|rad|deg|rev|ft)p(s|h|hr|min)(2?)$")  # mph are miles
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _SYMBOL_OF_AXIS = re.compile(r"(acc|accel|accl|gyro|gyr|vel|omega|a|g|w|v|f)([xyz])$")
@@ -233,7 +155,7 @@ class Vocabulary:
         words = words_of(body)
         unit, used = self._unit_at_end(words)
         unit = unit or stated or next((u for w in words if w in _ALWAYS and (u := self.unit_word(w))), None)
-        last = words_of(re.split(r"[./]", body)[-1])  # of a struct's field, less the structs it is in
+        last = words_of(re.split(r"[./]|::", body)[-1])  # of a struct's field, less the structs it is in
         text = words[: len(words) - used] or words
         text = [word for word in text if word not in _OF_MESSAGES or word in last]
         text, concepts = _symbol_at_end(text) if len(last) - used == 2 else (text, set())
@@ -250,8 +172,10 @@ class Vocabulary:
         if "speed" in concepts and words and words[-1] in _COMPASS:
             concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
             unit = None if unit == "N" else unit
-        if "speed" in concepts and unit == "kN":
-            unit = "kn"  # speed_kn: knots, no force
+        if "speed" in concepts and "time" not in concepts:
+            unit = {"kN": "kn", "ms": "m/s"}.get(
+                unit or "", unit
+            )  # speed_kn: knots, no force; no milliseconds
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
 
@@ -298,6 +222,10 @@ class Vocabulary:
                     "min",
                 ):
                     return f"{top}/{bottom.replace('s2', 's^2')}", count
+        if len(words) > 3 and words[-2] == "per":  # RadPerSec
+            parts = self.unit_word(words[-3]), _HOURS.get(words[-1]) or self.unit_word(words[-1])
+            if None not in parts:
+                return f"{parts[0]}/{parts[1]}", 3
         lever = _MOMENTS.get(" ".join(words[-2:]))
         if lever is not None and any("torque" in self.concepts_of(word) for word in words[:-2]):
             return lever, 2
@@ -330,7 +258,7 @@ def _symbol_at_end(text: list[str]) -> tuple[list[str], set[str]]:
     letter, index = text[-2:]
     if letter in _AXIS_SYMBOLS and index in ("x", "y", "z"):
         return [*text[:-2], letter + index], set()
-    if letter in _SYMBOLS and (index in _CORNERS or index in "lr12345678"):
+    if letter in _SYMBOLS and (index in CORNERS or index in "lr12345678"):
         return [*text[:-2], index], {_SYMBOLS[letter]}  # M1, w_rl, log.n_fl
     return text, set()
 
@@ -382,7 +310,7 @@ def _settled(concepts: set[str]) -> frozenset[str]:
 
 def _wheel_of(words: list[str], last: list[str], concepts: set[str]) -> str:
     """The wheel that a name speaks of: a corner, a side with its end or its axle's number or neither, or a number; empty if none."""
-    corners = _CORNERS | _FRENCH_CORNERS if not set(_FRENCH).isdisjoint(words) else _CORNERS
+    corners = CORNERS | FRENCH_CORNERS if not set(FRENCH).isdisjoint(words) else CORNERS
     for word in words:
         if word in corners:
             return corners[word]

@@ -1,0 +1,142 @@
+"""inspect and read on headers and layouts as loggers in public repositories write them, filled with a drive whose truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from terragrip.formats.candidates import candidates_of, columns_of
+from terragrip.formats.channel_proposal import Proposal
+from terragrip.formats.recognition import propose
+from terragrip.formats.time_column import find_time
+from terragrip.formats.vocabulary import GENERAL
+from terragrip.units import factor_to
+from terragrip.vehicle import Vehicle
+
+TIME = np.arange(0.0, 120.0, 0.05)
+SPEED = 2.0 + 0.4 * np.sin(TIME / 7)  # m/s
+WHEELS = ("fl", "fr", "rl", "rr")
+RADIUS = 0.36  # m
+ROVER = Vehicle.from_dict(
+    {
+        "name": "rover",
+        "mass": 490,
+        "wheelbase": 0.96,
+        "track": 0.86,
+        "center_of_gravity_height": 0.48,
+        "hitch_height": 0.35,
+        "axles": {
+            "front": {"mass": 200, "wheels": ["fl", "fr"]},
+            "rear": {"mass": 290, "wheels": ["rl", "rr"]},
+        },
+        "wheel": {"radius": RADIUS, "inertia": 0.4},
+    }
+)
+
+
+def _propose(columns: dict[str, np.ndarray], vehicle: Vehicle | None = None) -> dict[str, Proposal]:
+    return propose(columns, (), {}, dict.fromkeys(columns, TIME), vehicle=vehicle)
+
+
+def _channel(name: str, *beside: str) -> str:
+    """The channel that a column's name and unit alone stand for first, "" if none."""
+    column = columns_of((name, *beside), {}, {}, GENERAL)[name]
+    return next((one.channel for one in candidates_of(column)), "")
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [
+        ("wheel_angular_velocity_fl", "wheel_speed_fl"),
+        ("FL_wheel_rate", "wheel_speed_fl"),
+        ("WHL_SpdFLVal", "wheel_speed_fl"),
+        ("v_l(ips)", "wheel_speed_l"),
+        ("Rotação roda dianteira esquerda (rpm)", "wheel_speed_fl"),
+        ("Torque roda traseira direita (N.m)", "drive_torque_rr"),
+        ("Força de tração (kN)", "drawbar_force"),
+        ("v_gps_ms", "ground_speed"),
+        ("angular_velocity", "angular_velocity_z"),
+        ("/Drive/Gyro/YawVelocityRadPerSec", "angular_velocity_z"),
+        ("CAN 1::EBC2::FrontAxleSpeed", "wheel_based_speed"),
+        ("CAN 1::EEC1::EngineSpeed", "engine_speed"),
+        ("Actual Engine - Percent Torque (%)", "engine_torque_share"),
+        ("Wheel-Based Vehicle Speed (kph)", "wheel_based_speed"),
+        ("groundSpeedGearbox", "wheel_based_speed"),
+        ("LONGTITUDE", "longitude"),
+    ],
+)
+def test_names_of_public_loggers(name: str, channel: str) -> None:
+    assert _channel(name) == channel
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "transmission_output_speed_rpm",
+        "gearbox_speed_ratio",
+        "yaw_rate_left",
+        "sample_rate_fl",
+        "wheel_angle_fl",
+    ],
+)
+def test_names_that_are_no_speed_of_a_vehicle_or_a_wheel(name: str) -> None:
+    assert _channel(name) not in ("wheel_based_speed", "wheel_speed_l", "wheel_speed_fl")
+
+
+def test_a_wheels_rate_is_its_speed_and_its_angle_is_none() -> None:
+    """w1_angle was the speed of wheel 1, and w1_rate nothing."""
+    names = [f"w{n}_{what}" for n in range(1, 5) for what in ("angle", "rate")]
+    read_as = {name: _channel(name, *names) for name in names}
+    assert read_as["w2_rate"] == "wheel_speed_2"
+    assert read_as["w2_angle"] == ""
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m/s", 1.0), ("km/h", 3.6)])
+def test_rim_speeds_under_our_own_names_have_a_question_mark(unit: str, factor: float) -> None:
+    """wheel_speed_fl in m/s or km/h was proposed as rad/s for certain: slip -.64 and .23 for .11, stated to .08."""
+    columns = {f"wheel_speed_{wheel}": factor * SPEED / 0.95 for wheel in WHEELS}
+    for name in ("v_ego", "v_ego_mps"):  # in an assumed unit, and in a stated one
+        result = _propose(columns | {name: SPEED}, ROVER)
+        assert all(result[column].is_doubtful or result[column].unit == unit for column in columns)
+        assert any(unit in f"{result[c].doubt} {result[c].unit}" for c in columns)
+
+
+def test_turning_wheels_under_our_own_names_have_none() -> None:
+    columns = {f"wheel_speed_{wheel}": SPEED / 0.95 / RADIUS for wheel in WHEELS}
+    for name in ("v_ego", "v_ego_mps"):
+        result = _propose(columns | {name: SPEED}, ROVER)
+        assert not any(result[column].is_doubtful for column in columns)
+
+
+def test_a_second_speed_in_another_unit_is_the_vehicles_own() -> None:
+    """Both were compared as numbers: km/h beside m/s was no speed of the wheels."""
+    result = _propose({"GPS Speed (m/s)": SPEED, "Speed (OBD) (km/h)": 3.6 * SPEED / 0.9})
+    assert result["ground_speed"].columns == ("GPS Speed (m/s)",)
+    assert result["wheel_based_speed"].columns == ("Speed (OBD) (km/h)",)
+
+
+def test_accelerations_in_thousandths_of_gravity() -> None:
+    """A traceback: mg was a mass where the rate of turn is compared with the acceleration sideways."""
+    assert factor_to("mg", "m/s^2") == pytest.approx(9.80665e-3)
+    with pytest.raises(ValueError, match="mass"):
+        factor_to("mg", "m/s")
+    turn = 0.3 * np.sin(TIME / 11)
+    columns = {
+        "ICM_ax": 20 * np.sin(TIME),
+        "ICM_ay": SPEED * turn * 1000 / 9.80665,
+        "ICM_az": 1000 + np.sin(TIME),
+    }
+    result = _propose(columns | {"ICM_gz": np.degrees(turn), "GPS_speed_kmh": 3.6 * SPEED})
+    assert result["acceleration_y"].unit == "mg"
+
+
+def test_the_seconds_of_a_minute_are_no_time() -> None:
+    """Columns hour, minute, second: second was the time without a question mark, with 110 gaps."""
+    clock = TIME[:2220]
+    assert find_time({"minute": np.floor(clock / 60), "second": np.floor(clock) % 60}, (), {}) is None
+    assert find_time({"second": TIME}, (), {}) is not None
+
+
+def test_a_column_named_by_a_unit_of_time_alone_and_lcms_utime() -> None:
+    assert find_time({"ms": 1000 * TIME}, (), {}).unit == "ms"
+    assert find_time({"utime": 1.7e15 + 1e6 * TIME}, (), {}).unit == "us"
