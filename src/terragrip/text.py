@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from terragrip.errors import InputError
 
+_BEYOND_ASCII = re.compile(rb"[\x80-\xff]+")
+_GB2312 = re.compile(rb"(?:[\xa1-\xa9\xb0-\xf7][\xa1-\xfe])+")
 HEAD = 1 << 16  # bytes that are looked at
 _BINARY = bytes(range(9)) + bytes(range(14, 32)) + b"\x7f"
 _MAGIC = (
@@ -77,14 +80,21 @@ def to_text(data: bytes, source: str) -> bytes:
 
 
 def in_utf8(data: bytes) -> bytes:
-    """Text as UTF-8; what is not UTF-8 is taken for Latin-1."""
+    """Text as UTF-8; what is not UTF-8 is taken for GB 18030 where that makes it Chinese, else for Latin-1."""
     if data.isascii():
         return data
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
+        return _decoded(data).encode()
     return data
+
+
+def _decoded(data: bytes) -> str:
+    """Text that is not UTF-8: GB 18030 if all that is not ASCII is of its common characters (GB 2312), in runs of two or more."""
+    runs = _BEYOND_ASCII.findall(data)
+    is_chinese = all(len(run) % 2 == 0 and _GB2312.fullmatch(run) for run in runs) and max(map(len, runs)) > 2
+    return data.decode("gb18030" if is_chinese else "latin-1")
 
 
 def _binary(source: str) -> InputError:

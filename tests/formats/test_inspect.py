@@ -348,7 +348,7 @@ def test_a_vehicle_that_does_not_fit_is_not_called_ready(
 @pytest.mark.parametrize(
     ("driven", "expected"),
     [
-        (None, "unless the vehicle file says 'driven: false'"),
+        (None, "or 'driven: false' for its axle"),
         (False, ""),
         (True, "says is driven: name its column"),
     ],

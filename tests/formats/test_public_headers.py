@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from terragrip.formats import inspect, read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.recognition import propose
@@ -63,6 +66,12 @@ def _channel(name: str, *beside: str) -> str:
         ("Wheel-Based Vehicle Speed (kph)", "wheel_based_speed"),
         ("groundSpeedGearbox", "wheel_based_speed"),
         ("LONGTITUDE", "longitude"),
+        ("Vehicle Speed (km/h) *OBD", "ground_speed"),
+        ("左前轮速(rpm)", "wheel_speed_fl"),
+        ("右后轮转矩(N·m)", "drive_torque_rr"),
+        ("牵引力(kN)", "drawbar_force"),
+        ("横摆角速度(deg/s)", "angular_velocity_z"),
+        ("目标车速(km/h)", ""),
     ],
 )
 def test_names_of_public_loggers(name: str, channel: str) -> None:
@@ -140,3 +149,70 @@ def test_the_seconds_of_a_minute_are_no_time() -> None:
 def test_a_column_named_by_a_unit_of_time_alone_and_lcms_utime() -> None:
     assert find_time({"ms": 1000 * TIME}, (), {}).unit == "ms"
     assert find_time({"utime": 1.7e15 + 1e6 * TIME}, (), {}).unit == "us"
+
+
+ROWS = "\n".join(
+    f"{t:.2f},{3.6 * v:.3f},{v / 0.95 / RADIUS:.3f}" for t, v in zip(TIME[:200], SPEED[:200], strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time,speed,wheel\nf8,f8,f8\ns,km/h,rad/s",  # INCA
+        "time,speed,wheel\ns,km/h,rad/s\n,100: gps,200: obd",  # RaceChrono
+        "time,speed,wheel\ns,km/h,rad/s",
+    ],
+)
+def test_units_among_the_rows_of_a_header(tmp_path: Path, header: str) -> None:
+    """A row of types above the units was data: 'f8' is not a number."""
+    log = tmp_path / "log.csv"
+    log.write_text(f"{header}\n{ROWS}\n")
+    profile = {"channels": {"wheel_speed_l": "wheel", "ground_speed": "speed"}}
+    path = tmp_path / "p.yaml"
+    path.write_text(f"channels: {profile['channels']}")
+    recording = read(log, path)
+    assert len(recording.time) == 200
+    assert recording["ground_speed"][0] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_texts_under_a_header_are_no_units(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,ground_speed,wheel_speed_l,mark\n0,1,2,a\n1,1,2,b\n")
+    assert len(read(log).time) == 2
+
+
+def test_remarks_between_rows_are_left_out(tmp_path: Path) -> None:
+    """'row 2225: has 1 cell, the header 16', of TrackAddict's lines between laps; #N/A is a cell."""
+    log = tmp_path / "log.csv"
+    lines = ROWS.split("\n")
+    rows = [*lines[:50], "# Lap 1: 00:00:02.50", "#N/A,7.2,5.8", *lines[50:], "# Session End"]
+    log.write_text("\n".join(["# RaceRender Data", "time,speed [km/h],wheel_speed_l", *rows]) + "\n")
+    path = tmp_path / "p.yaml"
+    path.write_text("channels: {wheel_speed_l: wheel_speed_l, ground_speed: speed}")
+    assert len(inspect(log).columns) == 3
+    assert inspect(log).rows == 201
+
+
+def test_a_table_with_a_row_for_each_value_says_how_it_becomes_a_log(tmp_path: Path) -> None:
+    """Car Scanner's layout got no word: 'No wheel speed'."""
+    log = tmp_path / "log.csv"
+    rows = [
+        f"{t:.2f};{name};{value:.3f};km/h"
+        for t, v in zip(TIME[:200], SPEED[:200], strict=True)
+        for name, value in (("Speed (GPS)", v), ("Vehicle speed", v / 0.9))
+    ]
+    log.write_text("\n".join(["SECONDS;PID;VALUE;UNITS", *rows]) + "\n")
+    notes = [note for note in inspect(log).warnings if "pivot_table" in note]
+    assert len(notes) == 1
+    assert notes[0].startswith("VALUE holds the values of 2 signals, which PID names")
+    assert 'columns=t["PID"] + " [" + t["UNITS"] + "]"' in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "encoding"), [("车速", "gbk"), ("车速", "utf-8"), ("Geschw. über Grund äöüß", "latin-1")]
+)
+def test_the_encoding_of_a_header(tmp_path: Path, name: str, encoding: str) -> None:
+    log = tmp_path / "log.csv"
+    log.write_bytes(f"time,{name},wheel_speed_l\n{ROWS}\n".encode(encoding))
+    assert name in [column.name for column in inspect(log).columns]

@@ -19,6 +19,7 @@ from terragrip.written_times import FORMS, doubt, times_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_REMARKS = re.compile(rb"^# .*(?:\n|\Z)", re.MULTILINE)  # not #N/A
 _BLANKS = re.compile(rb"[ \t]+")
 _MISSING = [
     *("", "NaN", "nan", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None"),
@@ -30,7 +31,7 @@ def body_of(
     data: bytes, dialect: Dialect, start: int, *, more: bool = False
 ) -> tuple[bytes | memoryview, Dialect, list[str]]:
     """The rows from ``start`` on, how they are then written, and notes: a last line that was cut off while writing is left out, and so
-    are empty lines of a spreadsheet at the end; runs of blanks become tabs.
+    are empty lines of a spreadsheet at the end, and remarks between the rows (``# Lap 1 ...``); runs of blanks become tabs.
 
     ``more``: there are rows before these.
     """
@@ -45,6 +46,8 @@ def body_of(
     ends = data.find(b"\n", len(data.rstrip(b" \t\r\n" + dialect.separator.encode()))) + 1
     if ends:  # what stands behind is lines of separators
         body = body[: max(ends - start, 0)]
+    if data.startswith(b"# ", start) or data.find(b"\n# ", start) >= 0:
+        body = _REMARKS.sub(b"", bytes(body))
     if dialect.separator == " ":
         body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
         dialect = replace(dialect, separator="\t")

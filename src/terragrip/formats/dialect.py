@@ -69,8 +69,9 @@ def detect(data: bytes, source: str) -> Dialect:
         header.append("")
     names, units = names_and_units(header)
     rows = _header_rows(table, decimal)
-    if rows > 1:
-        units |= {name: stated for name, cell in zip(names, second, strict=False) if (stated := _bare(cell))}
+    if rows > 1:  # of short names one may be a unit, too: t
+        row = max(table[1:rows], key=lambda row: sum(is_common(_bare(cell)) for cell in row))
+        units |= {name: stated for name, cell in zip(names, row, strict=False) if (stated := _bare(cell))}
     columns = list(zip_longest(*table[rows:], fillvalue=""))
     in_cells = {
         k: unit
@@ -103,11 +104,13 @@ def _require_table(lines: list[str], source: str) -> None:
 
 
 def _header_rows(table: list[list[str]], decimal: str) -> int:
-    """How many rows the header has: names; names and units; or names, units and short names."""
-    if len(table) > 2 and _is_units_row(table[1], table[2], decimal):
-        return 2
-    short = len(table) > 3 and not any(_is_number(cell, decimal) for cell in table[2])
-    return 3 if short and _is_units_row(table[1], table[3], decimal) else 1
+    """How many rows the header has: names, and up to two more without a number, one of which has units: types, short names, sources."""
+    for rows in range(2, min(4, len(table))):
+        if any(_is_number(cell, decimal) for cell in table[rows - 1]):
+            break
+        if any(_is_number(cell, decimal) for cell in table[rows]):
+            return rows if any(_is_units_row(row, table[rows], decimal) for row in table[1:rows]) else 1
+    return 1
 
 
 def _unit_in_all(cells: tuple[str, ...]) -> str | None:

@@ -20,7 +20,7 @@ from terragrip.formats.recognition import of_one_joint, silent
 from terragrip.formats.seen import Seen, read_whole_or_thinned, size_of
 from terragrip.formats.signals import SignalLog
 from terragrip.formats.signs import add_signs
-from terragrip.formats.spoilt import notes_on
+from terragrip.formats.spoilt import notes_on, of_a_long_table
 from terragrip.formats.table import LogTable
 from terragrip.formats.time_column import other_clocks
 from terragrip.formats.vocabulary import GENERAL
@@ -189,6 +189,7 @@ def _of_all_wheels(fits: Fit, channels: Iterable[str]) -> Fit:
 def _notes_on(seen: Seen) -> list[str]:
     """Sentences on texts that should be numbers and on clocks."""
     notes = [*notes_on(seen.texts(), GENERAL, timed=seen.stamp is not None)]
+    notes += of_a_long_table(seen.texts(), seen.numbers(), None if seen.stamp is None else seen.stamp.name)
     if seen.stamp is not None:
         notes += [f"{seen.stamp.name}: {seen.stamp.doubt}"] * bool(seen.stamp.doubt)
         notes += other_clocks(seen.numbers(), seen.stamp.name, seen.units)

@@ -30,18 +30,18 @@ if TYPE_CHECKING:
 def missing_channels(
     proposals: Collection[str], has_time: bool, columns: Collection[str] = (), vehicle: Vehicle | None = None
 ) -> list[str]:
-    """What is not among the channels that were found, and what follows, as sentences; ``columns`` are the log's."""
-    notes = [] if has_time else ["No time column was found: it is needed, in increasing seconds."]
+    """What is not among the channels that are recognised, and what follows, as sentences; ``columns`` are the log's."""
+    notes = [] if has_time else ["No time column is recognised: it is needed, in increasing seconds."]
     wheels = [w for w in wheel_names_in(proposals) if f"wheel_speed_{w}" in proposals]
     turns = bool(wheels) or "wheel_based_speed" in proposals
     if not turns:
         notes.append(
-            "No wheel speed was found, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
+            "No wheel speed is recognised, nor a drive train's (wheel_based_speed): it is needed. A motor's speed "
             "becomes one by 'scale' (1/gear ratio), an encoder's count by 'derivative_of' (docs: formats#in-a-profile)."
         )
         notes += _without_order(columns)
     if "ground_speed" not in proposals:
-        notes.append("No ground speed was found: slip and resistance need it; positions will do.")
+        notes.append("No ground speed is recognised: slip and resistance need it; positions will do.")
     return [*notes, *_missing_forces(proposals, wheels, vehicle)] if turns else notes
 
 
@@ -67,20 +67,20 @@ def _missing_forces(proposals: Collection[str], wheels: Sequence[str], vehicle: 
         if vehicle is not None and vehicle.driveline is not None:
             return []
         return [
-            "No wheel's drive torque was found, but the engine's: with a 'driveline' in the vehicle file the adhesion of all driven "
+            "No wheel's drive torque is recognised, but the engine's: with a 'driveline' in the vehicle file the adhesion of all driven "
             "wheels together can be estimated, without it slip alone."
         ]
     if len(without) == len(wheels):
         return [
-            "No drive torque was found (a motor's current, or the pressures on both sides of a hydraulic one, give it in a profile): "
+            "No drive torque is recognised (a motor's current, or the pressures on both sides of a hydraulic one, give it in a profile): "
             "slip, its zero-slip radius, distance and maps of slip can be estimated; adhesion, soil resistance, net traction, "
             "efficiency and soil curves cannot."
         ]
     driven = {} if vehicle is None else dict(zip(vehicle.wheels, vehicle.driven, strict=True))
     notes = [
-        f"No drive torque was found for wheel {wheel}, which the vehicle file says is driven: name its column in a profile."
+        f"No drive torque is recognised for wheel {wheel}, which the vehicle file says is driven: name its column in a profile."
         if wheel in driven
-        else f"No drive torque was found for wheel {wheel}: estimates need it, unless the vehicle file says 'driven: false' for its axle."
+        else f"No drive torque is recognised for wheel {wheel}: estimates need it, or 'driven: false' for its axle in the vehicle file."
         for wheel in without
         if driven.get(wheel, True)
     ]
@@ -88,11 +88,11 @@ def _missing_forces(proposals: Collection[str], wheels: Sequence[str], vehicle: 
         notes.append(NOTHING_TOWED)
     if "acceleration_x" not in proposals:
         notes.append(
-            "No acceleration_x was found: soil resistance is estimated from speed alone, more slowly."
+            "No acceleration_x is recognised: soil resistance is estimated from speed alone, more slowly."
         )
     if "pitch" not in proposals:
         notes.append(
-            "No pitch was found: the ground is assumed level, and a slope appears as soil resistance."
+            "No pitch is recognised: the ground is assumed level, and a slope appears as soil resistance."
         )
     return notes
 
@@ -220,7 +220,7 @@ def _nearly(name: str, profile: Profile, columns: tuple[str, ...]) -> str:
         return ""
     there = ", ".join(f"{channel} <- {column}" for channel, column in result.items())
     wanted = {c: [column for one in needed[c].chain for column in one.columns] for c in lacking[:4]}
-    away = "; ".join(f"{channel} (looked for {', '.join(names[:3])})" for channel, names in wanted.items())
+    away = "; ".join(f"{channel} (by the names {', '.join(names[:3])})" for channel, names in wanted.items())
     return f"The profile {name} nearly fits: {there}; but no {away}."
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ _MOST = 0.5  # of the cells are numbers: the column is one of numbers
 _JOINT = re.compile(r"(?:^|[^a-z])name[\[_]?\d+\]?$")
 """Of a message of joints, which may be in any order."""
 _LIST = re.compile(r"(\w+\()?[\[(].*,.*[\])]$")
+_VALUES = re.compile(r"values?|_value|val|wert|valeur|valor", re.IGNORECASE)
+_UNITS = re.compile(r"units?|uom|einheit", re.IGNORECASE)
 _LISTED = 4  # columns that are named
 
 
@@ -55,6 +57,24 @@ def notes_on(texts: Mapping[str, npt.NDArray[Any]], vocabulary: Vocabulary, *, t
         + _of_any_joint(texts)
         + [f"{len(notes) - _LISTED} more columns likewise."] * (len(notes) > _LISTED)
     )
+
+
+def of_a_long_table(
+    texts: Mapping[str, npt.NDArray[Any]], numbers: Iterable[str], time: str | None
+) -> list[str]:
+    """A sentence on a table with a row for each value: a text column names the signals, and another column holds their values."""
+    value = next((name for name in numbers if _VALUES.fullmatch(name)), None)
+    unit = next((name for name in texts if _UNITS.fullmatch(name)), None)
+    for name, cells in texts.items():
+        count = len(set(cells[:_ROWS]) - {None, ""})
+        if value is not None and name != unit and name not in LABELS and 1 < count <= 0.1 * len(cells):
+            columns = f't["{name}"] + " [" + t["{unit}"] + "]"' if unit else f'"{name}"'
+            return [
+                f"{value} holds the values of {count} signals, which {name} names, a row for each value. Make a column of each signal, by "
+                f't = pandas.read_csv(FILE, sep=None, engine="python"); t.pivot_table(index="{time or "TIME"}", columns={columns}, '
+                f'values="{value}").to_csv("wide.csv").'
+            ]
+    return []
 
 
 def _of_any_joint(texts: Mapping[str, npt.NDArray[Any]]) -> list[str]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from terragrip.formats.words import CORNERS, FRENCH, FRENCH_CORNERS, MEANINGS, UNIT_WORDS
+from terragrip.formats.words import CHINESE, CORNERS, FRENCH, FRENCH_CORNERS, MEANINGS, UNIT_WORDS
 from terragrip.units import is_common
 
 _ALWAYS = ("rpm", "rps", "kmh", "kph", "kmph", "mph", "mps")  # mean a unit wherever they stand
@@ -43,6 +43,7 @@ _PLURAL = re.compile(r"(\w{4,}?)(?:s|en?|n)")
 """Groups of columns: torques, roues, Drehmomente, Raddrehzahlen."""
 _ORDINAL = re.compile(r"(\d)(st|nd|rd|th)$", re.IGNORECASE)
 _VOWELS = re.compile(r"(?<!^)[aeiou]")
+_CHINESE = re.compile("|".join(sorted(CHINESE, key=len, reverse=True)))
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
 _OF_MESSAGES = frozenset({"fix", "status", "state", "raw", "exp"})
 """Words that name messages, topics and experiments too, and then say nothing of each field in them."""
@@ -50,6 +51,8 @@ _BEHIND = re.compile(
     r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*)[>}]?$"
 )
 """A unit without brackets that is no word: n in 1/min, yaw rate <°/s>."""
+_SOURCE = re.compile(r"(\([^()]*\)|\[[^\[\]]*\])\s*\*(\w+)$")
+"""Vehicle Speed (km/h) *OBD: the source behind the unit."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
 
 
@@ -195,6 +198,7 @@ class Vocabulary:
 
     def _parted(self, name: str) -> tuple[str, str | None]:
         """A name without the unit or remark at its end, and that unit; a word in brackets is the name's (``Speed (GPS)``)."""
+        name = _SOURCE.sub(r"\2 \1", name)
         behind = _BEHIND.search(name)
         if behind is not None and is_common(behind["unit"]):
             name = f"{name[: behind.start()]} [{behind['unit']}]"
@@ -290,6 +294,7 @@ def _rejoined(words: list[str]) -> list[str]:
 def _without_accents(name: str) -> str:
     if name.isascii():
         return name
+    name = _CHINESE.sub(lambda word: f" {CHINESE[word[0]]} ", name)
     parted = unicodedata.normalize("NFKD", unicodedata.normalize("NFC", name).translate(_UMLAUTS))
     return "".join(c for c in parted if not unicodedata.combining(c))
 

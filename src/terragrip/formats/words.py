@@ -76,6 +76,17 @@ CORNERS = {
 FRENCH_CORNERS = {"avg": "fl", "avd": "fr", "arg": "rl", "ard": "rr"}
 FRENCH = ("roue", "roues", "couple", "couples", "vitesse", "vitesses", "regime", "regimes")
 """Beside one of these words ``avg`` is *avant gauche*; elsewhere it is an average."""
+CHINESE = {
+    "时间": "time", "时刻": "time", "车速": "vehicle speed", "轮速": "wheel speed", "转速": "rotation", "速度": "speed",
+    "加速度": "acceleration", "角速度": "angular velocity", "横摆": "yaw", "航向": "heading", "俯仰": "pitch", "侧倾": "roll",
+    "扭矩": "torque", "转矩": "torque", "电流": "current", "牵引力": "drawbar pull", "车轮": "wheel", "驱动轮": "wheel",
+    "轮": "wheel", "电机": "motor", "发动机": "engine", "左": "left", "右": "right", "前": "front", "后": "rear",
+    "纵向": "longitudinal", "横向": "lateral", "垂向": "vertical", "纬度": "latitude", "经度": "longitude", "海拔": "altitude",
+    "高度": "altitude", "制动": "brake", "油门": "throttle", "目标": "target", "期望": "target", "设定": "target",
+    "最大": "max", "里程": "distance", "滑转率": "slip", "温度": "temperature", "电压": "voltage", "压力": "pressure",
+    "质量": "mass", "状态": "state", "方向盘": "steering",
+}  # fmt: skip
+"""Chinese has no blanks between words: the longest that fits is read first."""
 UNIT_WORDS = {
     "kmh": "km/h", "kph": "km/h", "mph": "mph", "knots": "knots", "knot": "knots", "kn": "kN", "rpm": "rpm", "rps": "rev/s",
     "dps": "deg/s", "ips": "in/s", "degs": "deg/s", "rads": "rad/s", "deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad",
