@@ -23,6 +23,10 @@ _MAGIC = (
     (b"#ROSBAG", "is a ROS bag", "export its topics as CSV or Parquet"),
     (b"\x89MCAP0", "is an MCAP log", "export its topics as CSV or Parquet"),
     (b"\x89HDF", "is an HDF5 or MATLAB 7.3 file", "export it as CSV or Parquet"),
+    *(
+        (magic, "is a netCDF 3 file", "give tg.read the table: xarray.open_dataset(FILE)")
+        for magic in (b"CDF\x01", b"CDF\x02", b"CDF\x05")
+    ),
     (b"MATLAB 5.0", "is a MATLAB file", "export it as CSV or Parquet"),
     (b"SQLite format 3", "is an SQLite database", "export it as CSV or Parquet"),
     (b"ARROW1", "is an Arrow or Feather file", "save it as Parquet"),

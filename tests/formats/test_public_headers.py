@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from terragrip.errors import InputError
 from terragrip.formats import inspect, read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal
@@ -216,3 +217,11 @@ def test_the_encoding_of_a_header(tmp_path: Path, name: str, encoding: str) -> N
     log = tmp_path / "log.csv"
     log.write_bytes(f"time,{name},wheel_speed_l\n{ROWS}\n".encode(encoding))
     assert name in [column.name for column in inspect(log).columns]
+
+
+def test_a_netcdf_3_file_is_named_and_a_header_that_begins_alike_is_none(tmp_path: Path) -> None:
+    (tmp_path / "x.nc").write_bytes(b"CDF\x01\x00\x00\x00\x00" + bytes(100))
+    with pytest.raises(InputError, match="is a netCDF 3 file"):
+        read(tmp_path / "x.nc")
+    (tmp_path / "log.csv").write_text("CDF,time,wheel_speed_l,ground_speed\n1,0,2,1\n1,1,2,1\n")
+    assert len(read(tmp_path / "log.csv").time) == 2
