@@ -68,6 +68,19 @@ def test_across_a_long_turn_loads_move_and_no_scale_is_named(
     assert any("its scale changed" in note for note in notes(sound, tracked)) == said
 
 
+def test_at_the_end_of_a_tight_turn_loads_have_moved_and_no_scale_is_named(
+    columns: Columns, tracked: Vehicle
+) -> None:
+    """A tractor that turns into the next lane, on a side slope: its torques leapt as the rims became even again."""
+    sound = late(straight(columns), 0.7, "drive_torque_rr", "drive_torque_fr")
+    turning = np.abs(columns["time"] - 29.5) < 1.5
+    for side, factor in (("l", 1.7), ("r", 0.3)):
+        for name in (f"wheel_speed_f{side}", f"wheel_speed_r{side}"):
+            sound[name] = np.where(turning, factor * sound[name], sound[name])
+    sound["angular_velocity_z"] = np.where(turning, -0.8, sound["angular_velocity_z"])
+    assert not any("its scale changed" in note for note in notes(sound, tracked))
+
+
 def test_the_torques_of_a_bend_that_only_the_rims_show_have_no_other_scale(
     columns: Columns, tracked: Vehicle
 ) -> None:

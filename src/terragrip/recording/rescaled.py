@@ -49,7 +49,7 @@ def rescaled_warnings(
     for axle in drive.axles:
         others = [one for one in drive.axles if one is not axle]
         notes += _of_axle(
-            recording, "wheel_speed", axle, drive.when, axle.rims, rows, [one.rims for one in others]
+            recording, "wheel_speed", axle, drive.when, axle.rims, rows, even, [one.rims for one in others]
         )
         if axle.pulls is not None:
             pulling = (axle.pulls > 0).all(axis=0) & (axle.pulls.sum(axis=0) > _PULLING * axle.load)
@@ -59,7 +59,7 @@ def rescaled_warnings(
                 if one.pulls is not None and (one.pulls[:, alike & pulling] > 0).all()
             ]
             notes += _of_axle(
-                recording, "drive_torque", axle, drive.when, axle.pulls, alike & pulling, beside
+                recording, "drive_torque", axle, drive.when, axle.pulls, alike & pulling, even, beside
             )
     return notes
 
@@ -71,9 +71,11 @@ def _of_axle(
     when: Floats,
     sides: Floats,
     rows: Bools,
+    even: Bools,
     others: list[Floats],
 ) -> list[str]:
-    """A sentence where the left over the right side (2, windows) of an axle steps in ``rows``; ``others``: those of other axles."""
+    """A sentence where the left over the right side (2, windows) of an axle steps in ``rows``, at an instant whose rims
+    are ``even``; ``others``: those of other axles."""
     speed = quantity == "wheel_speed"
     left, right = sides[:, rows]
     step = step_of(
@@ -90,6 +92,9 @@ def _of_axle(
     driving = np.logical_and.reduce([one > DRIVING * quantile(np.abs(one), 0.95) for one in raw])
     ratio = np.full(len(recording), np.nan)
     ratio[driving] = np.log(raw[0][driving] / raw[1][driving])
+    ratio[~even[np.searchsorted((when[1:] + when[:-1]) / 2, recording.time)]] = (
+        np.nan
+    )  # steps of a tight turn
     instant = _instant(recording.time, ratio, when[rows], at, size)
     if instant is None:
         return []
