@@ -43,7 +43,7 @@ def rescaled_warnings(
     if drive is None:
         return notes
     rims = np.concatenate([axle.rims for axle in drive.axles])
-    even = (np.abs(rims - drive.pace) < _EVEN * drive.pace).all(axis=0)
+    even: Bools = np.all(np.abs(rims - drive.pace) < _EVEN * drive.pace, axis=0)
     rows = drive.straight & even
     alike = rows if turn is not None else rows & np.all(drive.level, axis=0)
     for axle in drive.axles:
