@@ -65,22 +65,23 @@ static tg_real weight_on_ground(const tg_estimator *e, const tg_drive *drive)
     return drive->mass * e->settings.machine.gravity * drive->cosine + drive->hitch_load;
 }
 
-/* Predict over dt, in pieces where it is long, and update. Returns 0 where the filter had to restart. */
+/* Predict over dt, in pieces of at most max_step, and update. Returns 0 where the filter had to restart. */
 static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_input *now, tg_real dt, tg_real *q)
 {
     const tg_settings *s = &e->settings;
     tg_real y[TG_MAX_CHANNELS], r[TG_MAX_CHANNELS];
     tg_step step;
     int32_t pieces = 1;
-    if (dt > s->max_step) {
-        pieces = dt / s->max_step < 300 ? (int32_t)(dt / s->max_step) + 1 : 300;
+    /* In pieces, because the noise of a prediction enters at its end. A step that is a multiple but for its clock's rounding has as many. */
+    const tg_real steps = (tg_real)0.999 * dt / s->max_step;
+    if (steps >= 1) {
+        pieces = steps < 300 ? (int32_t)steps + 1 : 300;
         dt /= (tg_real)pieces;
         for (int32_t j = 0; j < TG_MAX_STATES; j++) q[j] /= (tg_real)pieces;
     }
     measured(e, row, y, r);
     tgi_deviations(e, now, e->belief.x);
-    /* The model holds the vehicle back by rho_s of its weight and this: what a turn on the spot makes less of it is taken off here. */
-    now->hitch_load -= (1 - tgi_held_back(e)) * weight_on_ground(e, drive);
+    if (tgi_on_the_spot(e)) now->hitch_load -= weight_on_ground(e, drive); /* the model holds the vehicle back by rho_s of its weight and this */
     tg_status status = TG_OK;
     for (int32_t k = 1; k < pieces && status == TG_OK; k++) {
         status = tg_filter_predict(&e->filter, dt, now, q);
@@ -119,7 +120,7 @@ static void balance_forces(tg_estimator *e, const tg_drive *drive, double time)
     const tg_machine *m = &e->settings.machine;
     const int32_t n = m->wheels;
     const tg_real d = (tg_real)e->direction;
-    tg_real force = -d * drive->calm_drawbar - tgi_held_back(e) * e->belief.x[n] * weight_on_ground(e, drive);
+    tg_real force = -d * drive->calm_drawbar - (tgi_on_the_spot(e) ? 0 : e->belief.x[n] * weight_on_ground(e, drive));
     for (int32_t i = 0; i < n; i++) force += e->belief.x[i] * drive->load[i];
     tgi_lowpass(&e->balance, e->standing ? 0 : d * force * drive->inverse_mass, time, e->settings.load_filter);
 }

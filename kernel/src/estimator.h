@@ -222,7 +222,7 @@ void tgi_find_silent(tg_estimator *e, double time);
 void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real rate);
 void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time);
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
-tg_real tgi_held_back(const tg_estimator *e);
+int32_t tgi_on_the_spot(const tg_estimator *e);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
 void tgi_along(const tg_estimator *e, const tg_drive *drive, tg_input *u);
 

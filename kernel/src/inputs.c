@@ -200,28 +200,28 @@ static void brake_noise(const tg_estimator *e, const tg_row *row, tg_real dt, tg
     }
 }
 
-/* In a turn on the spot the soil holds one side back and pushes the other on, so that the vehicle as a whole is held back by less: of the
- * resistance this share, from 0 where it does not move to 1 where one side stands still. Elsewhere 1. */
-tg_real tgi_held_back(const tg_estimator *e)
+/* Whether it turns on the spot, its sides going against each other: the soil holds one back and pushes the other on, so that the vehicle as a
+ * whole is not held back. */
+int32_t tgi_on_the_spot(const tg_estimator *e)
 {
     const tg_settings *s = &e->settings;
     const int32_t n = s->machine.wheels;
-    const tg_real side = e->constants.outermost * tgi_fabs(e->yaw_rate), v = e->belief.x[n + 1];
-    if (s->method != TG_FILTERED || side <= tgi_fabs(v) || side < s->standstill_speed) return 1;
+    const tg_real side = e->constants.outermost * tgi_fabs(e->yaw_rate);
+    if (s->method != TG_FILTERED || side <= tgi_fabs(e->belief.x[n + 1]) || side < s->standstill_speed) return 0;
     tg_real ahead = 0, back = 0; /* a vehicle that is stuck has a rate of turn of noise, and wheels that turn one way */
     for (int32_t i = 0; i < n; i++) {
         const tg_real rim = tgi_rolls(e, i) ? 0 : s->rolling_radius[i] * e->belief.x[n + 2 + i];
         ahead = tgi_max(ahead, rim);
         back = tgi_max(back, -rim);
     }
-    return ahead > s->standstill_speed && back > s->standstill_speed ? v / side : 1;
+    return ahead > s->standstill_speed && back > s->standstill_speed;
 }
 
-/* What it is less by is not known to the last: a force that lasts from one ground speed to the next, at most about a second, (m/s^2)^2 s. */
+/* Not to the last: a force that lasts from one ground speed to the next, at most about a second, (m/s^2)^2 s. */
 static tg_real spot_force(const tg_estimator *e)
 {
-    const tg_real less = (1 - tgi_fabs(tgi_held_back(e))) * e->belief.x[e->settings.machine.wheels] * e->settings.machine.gravity;
-    return tgi_square(less) * (e->ground.interval < 1 ? e->ground.interval : 1);
+    if (!tgi_on_the_spot(e)) return 0;
+    return tgi_square(e->belief.x[e->settings.machine.wheels] * e->settings.machine.gravity) * (e->ground.interval < 1 ? e->ground.interval : 1);
 }
 
 /* Input noise of the step that ends at `time`, from the inputs as they stood over it (physics.md 1: torque moves omega, drawbar

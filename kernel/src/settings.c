@@ -105,7 +105,7 @@ tg_settings tg_default_settings(void)
     s.prior_resistance_std = (tg_real)0.05;
     s.slope_spread = (tg_real)0.02;
     s.gap = 2;
-    s.max_step = (tg_real)0.1;
+    s.max_step = (tg_real)0.02;
     s.outlier_weight = (tg_real)0.5;
     s.load_filter = (tg_real)0.2;
     s.algebraic_filter = (tg_real)0.25;

@@ -135,7 +135,7 @@ def test_by_engine_torque_braked_rows_are_unsure_too() -> None:
     known = tg.estimate(log, tractor())
     unsure = tg.estimate(log.with_channels(brake=acts.astype(float)), tractor())
     rows = np.flatnonzero(acts)[3:]
-    assert (unsure["adhesion_driven_std"][rows] > 3 * known["adhesion_driven_std"][rows]).all()
+    assert (unsure["adhesion_driven_std"][rows] > 2.5 * known["adhesion_driven_std"][rows]).all()
     assert unsure["adhesion_driven_std"][-1] < 1.5 * known["adhesion_driven_std"][-1]
 
 

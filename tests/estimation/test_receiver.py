@@ -125,13 +125,15 @@ def test_a_machine_without_a_left_and_a_right_wheel_may_have_an_antenna() -> Non
     assert np.median(found["slip_rear"]) == pytest.approx(SLIP, abs=0.01)
 
 
-def on_the_spot(ahead: float, *, creep: float = 0.0, aside: float = 0.0, every: int = 5) -> Recording:
-    """A machine with two driven wheels and a caster: straight on, then round on the spot for 8 s, time and again; 25 Hz, positions 5.
+def on_the_spot(
+    ahead: float, *, creep: float = 0.0, aside: float = 0.0, every: int = 5, rate: int = 25
+) -> Recording:
+    """A machine with two driven wheels and a caster: straight on, then round on the spot for 8 s, time and again.
 
     There it goes at ``creep`` m/s, and slides ``aside`` m/s, which only the positions show; one in ``every`` rows holds one.
     """
-    rng, time = np.random.default_rng(5), np.arange(0, 120, 0.04)
-    spot = np.convolve(np.where(time % 30 > 20, 1.0, 0.0), np.ones(25) / 25, "same")
+    rng, time = np.random.default_rng(5), np.arange(0, 120, 1 / rate)
+    spot = np.convolve(np.where(time % 30 > 20, 1.0, 0.0), np.ones(rate) / rate, "same")
     yaw = np.clip(2 * spot - 1, 0, 1)
     speed = 0.8 * (1 - np.clip(2 * spot, 0, 1)) + creep * yaw
     there = np.hypot(speed, (ahead + aside) * yaw) + 0.012 * rng.standard_normal(len(time))
@@ -159,11 +161,15 @@ def when_on_spot(log: Recording) -> Any:
     return (log.time % 30 > 22.5) & (log.time % 30 < 29)
 
 
-@pytest.mark.parametrize(("creep", "aside"), [(0.0, 0.0), (-0.09, 0.0), (0.0, 0.15)])
-def test_round_on_the_spot_a_receiver_ahead_shows_no_speed_along(creep: float, aside: float) -> None:
+@pytest.mark.parametrize(
+    ("creep", "aside", "rate"), [(0.0, 0.0, 25), (-0.09, 0.0, 25), (-0.09, 0.0, 100), (0.0, 0.15, 25)]
+)
+def test_round_on_the_spot_a_receiver_ahead_shows_no_speed_along(
+    creep: float, aside: float, rate: int
+) -> None:
     """√(v² - (ω x)²) of noise is a speed, and always to one side: .09 m/s of 0 (a mower's slips .30 off); so are a reverse, whose sign
     the root does not show (.18 m/s off), and the way that a vehicle slides on a slope (.32)."""
-    log = on_the_spot(0.35, creep=creep, aside=aside)
+    log = on_the_spot(0.35, creep=creep, aside=aside, every=rate // 5, rate=rate)
     found = estimate(log, mower(antenna={"x": 0.35}))
     on_spot = when_on_spot(log)
     error = found["ground_speed"][on_spot] - creep

@@ -285,10 +285,12 @@ def _regular(time: Floats, speed: Floats) -> tuple[float, Floats] | None:
     time, speed = time[known], speed[known]
     if len(time) < 3 or time[-1] - time[0] < _LEAST_OVERLAP or (time[-1] - time[0]) / _STEP > _LONGEST:
         return None
-    points, steps = np.arange(time[0], time[-1], _STEP), np.diff(time)
-    values = np.interp(points, time, speed)
+    # To the microsecond, so that where a stamp is a point no rounding of the clock decides.
+    since = np.round(time - time[0], 6)
+    points, steps = np.round(_STEP * np.arange(np.ceil(round(since[-1] / _STEP, 6))), 6), np.diff(since)
+    values = np.interp(points, since, speed)
     if steps.max() > _BRIDGED:
-        after = np.clip(np.searchsorted(time, points), 1, len(time) - 1)
+        after = np.clip(np.searchsorted(since, points), 1, len(since) - 1)
         values[steps[after - 1] > max(_BRIDGED, 3.0 * median(steps))] = np.nan
     return float(time[0]), values
 
@@ -357,9 +359,10 @@ def _rates(speed: tuple[float, Floats]) -> tuple[Floats, Floats, Floats]:
 
 def _at(time: Floats, speed: tuple[float, Floats], seconds: float) -> Floats:
     """A regular speed whose clock is ``seconds`` ahead, at ``time`` (n,), NaN outside and in its gaps."""
-    stamps, known = speed[0] - seconds + _STEP * np.arange(len(speed[1])), np.isfinite(speed[1])
-    values = np.interp(time, stamps[known], speed[1][known], left=np.nan, right=np.nan)
-    away = np.isnan(np.interp(time, stamps, speed[1], left=np.nan, right=np.nan))
+    place = np.round((time - (speed[0] - seconds)) / _STEP, 6)
+    points, known = np.arange(len(speed[1])), np.isfinite(speed[1])
+    values = np.interp(place, points[known], speed[1][known], left=np.nan, right=np.nan)
+    away = np.isnan(np.interp(place, points, speed[1], left=np.nan, right=np.nan))
     return np.where(away, np.nan, values)
 
 
