@@ -68,8 +68,8 @@ def test_single_precision_gives_the_estimates_of_double(method, single):
 @pytest.mark.parametrize("rate", [10.0, 20.0, 50.0, 100.0])
 @pytest.mark.parametrize("origin", [1.0 / 3.0, 1e4 / 7.0])
 def test_another_origin_of_time_gives_the_same_estimates(origin, rate):
-    """Rounding decided which rows a curve learned from: curve_a was .06 of its standard deviations another at 100 Hz, up to nine at 20; at 10
-    Hz, whether a step was predicted in one piece or two, which moved adhesions by .05."""
+    """Rounding decided which rows a curve learned from: curve_a was .06 of its standard deviations another at 100 Hz, up to nine at 20;
+    at 10 Hz, whether a step was predicted in one piece or two, which moved adhesions by .05."""
     log = faulty_drive(rate)
     later = replace(log, time=log.time + origin)
     assert not np.array_equal(np.diff(later.time), np.diff(log.time))
