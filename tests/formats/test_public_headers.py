@@ -225,3 +225,24 @@ def test_a_netcdf_3_file_is_named_and_a_header_that_begins_alike_is_none(tmp_pat
         read(tmp_path / "x.nc")
     (tmp_path / "log.csv").write_text("CDF,time,wheel_speed_l,ground_speed\n1,0,2,1\n1,1,2,1\n")
     assert len(read(tmp_path / "log.csv").time) == 2
+
+
+def test_torques_beside_speeds_of_motors_may_be_the_motors() -> None:
+    """FL_torque [Nm] beside FL_motor_speed [rpm] was the wheel's for certain: adhesion a twelfth, behind a gear of 12."""
+    rims = {f"{w}_motor_speed [rpm]": 12 * 9.549 * SPEED / RADIUS for w in ("FL", "FR")}
+    torques = {f"{w}_torque [Nm]": 10 + np.sin(TIME) for w in ("FL", "FR")}
+    result = _propose(rims | torques | {"GPS_speed [km/h]": 3.6 * SPEED}, ROVER)
+    assert result["drive_torque_fl"].doubt == "at the wheel, or the motor's, as the speeds are?"
+    wheels = {
+        f"{w}_wheel_torque [Nm]": values for w, values in zip(("FL", "FR"), torques.values(), strict=True)
+    }
+    assert not _propose(rims | wheels | {"GPS_speed [km/h]": 3.6 * SPEED}, ROVER)[
+        "drive_torque_fl"
+    ].is_doubtful
+
+
+@pytest.mark.parametrize(("name", "sure"), [("omega_{}", True), ("v_wheel_{}", False)])
+def test_a_name_that_says_turning_leaves_rims_no_speed(name: str, sure: bool) -> None:
+    """With a radius near .28 m, rad/s and km/h look alike; omega is no km/h."""
+    columns = {name.format(wheel): SPEED / 0.95 / RADIUS for wheel in WHEELS} | {"gps_kmh": 3.6 * SPEED}
+    assert _propose(columns, ROVER)["wheel_speed_fl"].is_doubtful != sure

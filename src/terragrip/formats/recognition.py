@@ -122,7 +122,7 @@ def _proposed(
             if (guess := judge.of(column, candidate)) is not None:
                 ranked.setdefault(candidate.channel, []).append(guess)
     Agreement(columns, evidence, vehicle).refine(ranked)
-    chosen = _assigned(ranked)
+    chosen = _beside_motors(_assigned(ranked))
     proposals = {
         channel: proposal_of(channel, guess, ranked[channel], vehicle) for channel, guess in chosen.items()
     }
@@ -211,6 +211,21 @@ def _assigned(ranked: Mapping[str, list[Guess]]) -> dict[str, Guess]:
             if chosen[wheel].column.name.has("motor"):
                 del chosen[wheel]
     return chosen
+
+
+def _beside_motors(chosen: Mapping[str, Guess]) -> dict[str, Guess]:
+    """The guesses; torques that are said to be no wheel's are in doubt where the speeds are the motors': they may be, too."""
+    speeds = [guess for channel, guess in chosen.items() if channel.startswith("wheel_speed_")]
+    if not speeds or not all(guess.column.name.has("motor") for guess in speeds):
+        return dict(chosen)
+    doubt = "at the wheel, or the motor's, as the speeds are?"
+    return {
+        channel: replace(guess, doubt=doubt)
+        if channel.startswith("drive_torque_")
+        and not (guess.doubt or guess.column.name.has("wheel", "motor", "current"))
+        else guess
+        for channel, guess in chosen.items()
+    }
 
 
 def _constants(texts: Texts) -> dict[str, str]:

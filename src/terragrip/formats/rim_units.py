@@ -129,8 +129,10 @@ def rim_unit(
     columns: Mapping[str, str],
     ground: tuple[str, float] | None,
     paths: list[tuple[str, Path | float]],
+    *,
+    turning: bool = False,
 ) -> RimUnit | None:
-    """The unit of wheel speeds, None where nothing tells it.
+    """The unit of wheel speeds, None where nothing tells it. ``turning``: their names say that they turn (omega, rpm, Drehzahl).
 
     ``columns``: the column of each wheel that `radius_of` knows. ``ground``: the ground speed's column and its factor to m/s; without it
     the ``paths`` that were driven tell the mean.
@@ -147,10 +149,12 @@ def rim_unit(
     result |= {u: shares[1] / factor_to(u, "m/s") for u in SPEED}
     possible = {u: s for u, s in result.items() if POSSIBLE[0] <= s <= POSSIBLE[1]}
     kind = _kind_by_axles(evidence, vehicle, columns)
-    kept = {u: s for u, s in possible.items() if kind is None or u in kind}
+    kept = {
+        u: s for u, s in possible.items() if (kind is None or u in kind) and (not turning or u in ROTATION)
+    }
     # The usual ones first, then by how near the rims are to the ground's speed.
     ranked = sorted(kept.items(), key=lambda item: (not _is_usual(*item), abs(np.log(item[1]))))
-    return RimUnit(source, dict(ranked), shown_by_axles=len(kept) < len(possible))
+    return RimUnit(source, dict(ranked), shown_by_axles=kind is not None and len(kept) < len(possible))
 
 
 def _is_usual(unit: str, share: float) -> bool:

@@ -11,6 +11,7 @@ from terragrip.formats.candidates import kind_of
 from terragrip.formats.evidence import RADII, Evidence, Finding, Path, Series, nearest_unit, sizes, slope_of
 from terragrip.formats.judgement import Guess
 from terragrip.formats.rim_units import POSSIBLE, RimUnit, lightest_share, radius_of, rim_unit, speeds_of
+from terragrip.formats.words import MEANINGS
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -22,6 +23,7 @@ Ground = tuple[str, float]
 
 _TRACKS = {"rotation": (1.1, 14.0), "speed": (0.15, 5.0)}
 """Track over radius, or track in m, that the difference of right and left over the rate of turn may make; skid steering counts double."""
+_TURNING_WORDS = frozenset(MEANINGS["rotation"].split()) - {"w"}
 _TURNING = 0.08  # rad/s: less turns too little to show a track
 # m, rad/s: a wheel this small that turns this fast is rarer than turns a minute called rad/s.
 _SMALL, _FAST = 0.1, 30.0
@@ -30,6 +32,14 @@ _SMALL, _FAST = 0.1, 30.0
 def surest(ranked: Mapping[str, list[Guess]], channel: str) -> Guess | None:
     """The guess of a channel with the highest confidence; None where there is none."""
     return max(ranked.get(channel, ()), key=lambda guess: guess.confidence, default=None)
+
+
+def _turn(ranked: Mapping[str, list[Guess]], columns: Mapping[str, str]) -> bool:
+    """Whether the names of all ``columns`` of wheels say that they turn; w or n alone does not, nor a speed."""
+    guesses = [
+        g for wheel, c in columns.items() for g in ranked[f"wheel_speed_{wheel}"] if g.column.column == c
+    ]
+    return all(_TURNING_WORDS & set(g.column.name.words) and not g.column.name.has("speed") for g in guesses)
 
 
 class Rims:
@@ -54,7 +64,7 @@ class Rims:
         channels = [c for c in ranked if c.startswith("wheel_speed_")]
         alike = self._without_unit(ranked, channels)
         by_radius = (
-            rim_unit(self._evidence, self._vehicle, alike, ground, paths)
+            rim_unit(self._evidence, self._vehicle, alike, ground, paths, turning=_turn(ranked, alike))
             if self._vehicle is not None and alike
             else None
         )
