@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terragrip.errors import InputError
-from terragrip.formats import inspect, read
+from terragrip.formats import Profile, inspect, read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.recognition import propose
@@ -246,3 +246,9 @@ def test_a_name_that_says_turning_leaves_rims_no_speed(name: str, sure: bool) ->
     """With a radius near .28 m, rad/s and km/h look alike; omega is no km/h."""
     columns = {name.format(wheel): SPEED / 0.95 / RADIUS for wheel in WHEELS} | {"gps_kmh": 3.6 * SPEED}
     assert _propose(columns, ROVER)["wheel_speed_fl"].is_doubtful != sure
+
+
+def test_a_scale_of_0_is_refused() -> None:
+    """All speeds were 0: slip .57 ± .36, and a note on a dead sensor."""
+    with pytest.raises(InputError, match="makes every value 0; write the factor"):
+        Profile.from_dict({"channels": {"ground_speed": {"from": "v", "scale": 0}, "wheel_speed_l": "w"}})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import struct
 
 import cantools
@@ -262,3 +263,18 @@ def test_the_ground_is_a_frame_too(vehicle):
         {"SoilNumber": 2, "SoilProbability": 0.7, "ChangeProbability": 0.9, "ChangeAge": 3.5}, abs=0.003
     )
     assert message.decode(soil(13.0, "unknown"))["SoilNumber"] == 0
+
+
+@pytest.mark.asyncio
+async def test_a_system_without_socketcan_is_named(vehicle, monkeypatch):
+    """'[Errno 97] Address family not supported by protocol'."""
+    import can
+
+    def refuse(**_):
+        raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    service = Service(vehicle, ["can:vcan0"])
+    async with running(service):
+        await until(lambda: events(service, "source_lost"))
+    assert "this system has no SocketCAN" in events(service, "source_lost")[0]

@@ -106,6 +106,8 @@ class Source(Part):
                 "write the latitude first, then the longitude",
                 ("derivative_of",),
             )
+        if self.scale == 0:
+            raise Fault("makes every value 0", "write the factor from the column to its unit", ("scale",))
         if self.window <= 0:
             raise Fault("is not a span of time", "write e.g. '0.5 s'", ("window",))
         return self

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import math
 import sys
 from collections.abc import AsyncIterator
@@ -213,6 +214,10 @@ async def bus_of(uri: Uri) -> AsyncIterator[Any]:
     try:
         bus = await asyncio.to_thread(can.Bus, **options)
     except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
+        if getattr(error, "errno", None) == errno.EAFNOSUPPORT:
+            raise Lost(
+                "the bus: this system has no SocketCAN: load can and can_raw, or give an interface"
+            ) from error
         raise Lost(f"the bus: {' '.join(str(error).split())[:160]}") from error
     try:
         yield bus
