@@ -4,7 +4,6 @@
  * score that warns. Only rows whose ground speed was measured count: between them slip follows from the model. */
 #include "estimator.h"
 
-#define TG_SHARP ((tg_real)0.02) /* SD of slip from which on a row of an interval counts less: between measured speeds it is large */
 #define TG_FLOOR ((tg_real)0.1) /* adhesion that is added where two small ones are compared */
 
 /* Exact also where intervals are longer than tau. */
@@ -47,11 +46,11 @@ static void signals_of(const tg_estimator *e, const tgi_view *l, tg_real *now)
 }
 
 /* A view is nothing but reals. */
-static void add(tgi_view *sum, const tgi_view *l, tg_real weight)
+static void add(tgi_view *sum, const tgi_view *l, tg_real share)
 {
     tg_real *const to = (tg_real *)sum;
     const tg_real *const from = (const tg_real *)l;
-    for (size_t k = 0; k < sizeof *sum / sizeof *to; k++) to[k] += weight * from[k];
+    for (size_t k = 0; k < sizeof *sum / sizeof *to; k++) to[k] += share * from[k];
 }
 
 /* Where a machine works at much slip, that is soon usual, and stays so over its turns and ways between. */
@@ -63,21 +62,20 @@ static void learn_usual(const tg_watch_settings *s, tg_real pace, tg_real since,
     for (int32_t k = 0; k < 2; k++) d->usual[k] = d->age > 0 ? low_pass(d->usual[k], since, bounded(d->age, 0, memory[k] * pace), usual[k]) : usual[k];
 }
 
-/* Add a row to the interval, weighted by how well its slip is known; returns whether that ended one, whose signals then are in the means.
+/* Add a row to the interval; returns whether that ended one, whose signals then are in the means.
  * `since` becomes the time between the ends of two. */
 static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_real *since)
 {
     tgi_digging *d = &e->watch.digging;
     const tg_real pace = e->constants.pace;
-    const tg_real weight = 1 / tgi_square(row->deviation + TG_SHARP);
-    add(&d->sum, row, weight);
-    d->weight += weight;
+    add(&d->sum, row, 1);
+    d->rows += 1;
     *since = d->moving ? (tg_real)(time - d->time) : 0;
     if (d->moving && *since < (tg_real)0.95 * TG_SHORT * pace) return 0;
     tg_real now[TGI_SIGNALS];
     tgi_view mean;
     memset(&mean, 0, sizeof mean);
-    add(&mean, &d->sum, 1 / d->weight);
+    add(&mean, &d->sum, 1 / d->rows);
     signals_of(e, &mean, now);
     for (int32_t k = 0; k < TGI_SIGNALS; k++) {
         d->now[k] = d->moving ? low_pass(d->now[k], *since, TG_SHORT * pace, now[k]) : now[k];
@@ -85,7 +83,7 @@ static int32_t add_row(tg_estimator *e, double time, const tgi_view *row, tg_rea
     }
     learn_usual(&e->settings.watch, pace, *since, d);
     memset(&d->sum, 0, sizeof d->sum);
-    d->weight = 0;
+    d->rows = 0;
     d->age += *since;
     d->moving = 1;
     d->time = time;
@@ -98,7 +96,7 @@ void tgi_digging_rest(tgi_digging *d)
     memset(&d->sum, 0, sizeof d->sum);
     memset(d->points, 0, sizeof d->points);
     d->moving = d->slips = 0;
-    d->weight = d->score = 0;
+    d->rows = d->score = 0;
 }
 
 /* After a row whose ground speed was measured; returns whether it ended an interval. */

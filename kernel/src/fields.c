@@ -55,7 +55,7 @@ static const tgi_field algebra[] = {INSIDE(T, wheel, tg_lowpass, lowpass), INSID
                                     REALS(T, ground_rate), REALS(T, gain), END};
 #undef T
 #define T tgi_digging
-static const tgi_field digging[] = {REALS(T, sum), REALS(T, weight), REALS(T, now), REALS(T, mean), REALS(T, usual), REALS(T, age),
+static const tgi_field digging[] = {REALS(T, sum), REALS(T, rows), REALS(T, now), REALS(T, mean), REALS(T, usual), REALS(T, age),
                                     REALS(T, points), REALS(T, score), DOUBLES(T, time), FLAG(T, moving), FLAG(T, slips), END};
 #undef T
 #define T tgi_watch

@@ -88,8 +88,8 @@ typedef struct { /* of the driven wheels, along the travel; see immobilization.c
 enum { TGI_SLIP, TGI_DEVIATION, TGI_BALANCE, TGI_RESISTANCE, TGI_RIM, TGI_TRAVEL, TGI_BALANCE_DEVIATION, TGI_RESISTANCE_DEVIATION, TGI_SIGNALS };
 
 typedef struct { /* see digging.c */
-    tgi_view sum;              /* of the rows since the last interval, weighted, */
-    tg_real weight;            /* and of their weights */
+    tgi_view sum;              /* of the rows since the last interval, */
+    tg_real rows;              /* and how many they are */
     tg_real now[TGI_SIGNALS], mean[TGI_SIGNALS]; /* low-passed over a tenth of the unit of time, and over it */
     tg_real usual[2];          /* slip, balance */
     tg_real age;               /* s of looking in all */
