@@ -33,6 +33,7 @@ _EDGE = 0.3  # m on either side of a soil's border
 _RADIUS = 0.003  # prior of the wheels' relative radii where the vehicle states none
 _LEAST_OFFSET = 1e-3  # N m
 _LEAST_PULL_EFFECT = 0.005  # relative: a smaller effect of a pull that no cell measures is not reported
+_ASIDE = 0.15  # of what leans from side to side: heights are known to that (classes.yaml), and so is which axle bears how much of it
 _NO_PULL = (
     "no log has a drawbar_force, and what a tool pulls moves load between the axles, so that these gains are open by "
     "{:.1f} %: measure it, or leave hitch_height out of the vehicle file where nothing is ever towed"
@@ -266,7 +267,7 @@ def _near_border(table: Windows) -> Bools:
 def _considered_loads(
     fit: SharedGains, table: Windows, vehicle: Vehicle, driven: Ints, errors: ChannelErrors
 ) -> Floats:
-    """Covariance (2 w, 2 w) that constant errors of the channels add by shifting load from wheel to wheel."""
+    """Covariance (2 w, 2 w) that constant errors of the channels, and of what leans aside, add by shifting load from wheel to wheel."""
     rest = {
         "drawbar": np.nan_to_num(table.drawbar),
         "push": np.nan_to_num(table.push),
@@ -277,6 +278,12 @@ def _considered_loads(
     for name in rest:
         after = _mean_loads(table, vehicle, {**rest, name: rest[name] + getattr(errors, name)})
         changes.append(after / before - 1)
+    aside = before - _mean_loads(table, vehicle, {**rest, "lateral": np.zeros(len(table))})
+    front = vehicle.wheel_axle == 0
+    levers = np.abs(aside) @ np.array([front, ~front]).T
+    changes.append(_ASIDE * aside / before)
+    if levers.all():  # a stiff chassis leaves open which axle bears it
+        changes.append(changes[-1] * np.where(front, 1.0, -levers[0] / levers[1]))
     effects = [fit.load_sensitivity @ change[driven] for change in changes]
     return np.sum([np.outer(effect, effect) for effect in effects], axis=0)
 

@@ -115,6 +115,8 @@ def _windows_of(index: int, recording: Recording, vehicle: Vehicle, length: floa
     turn = np.nan_to_num(yaw)
     ahead, side = vehicle.receiver
     speed = middle_speed(mean("ground_speed"), turn, ahead=ahead, side=side)
+    if not np.isfinite(lateral).any():  # what an accelerometer would read, as in estimates (physics.md 3)
+        lateral = speed * turn + GRAVITY * np.sin(np.nan_to_num(mean("roll")))
     across = np.sqrt(np.nan_to_num(mean("angular_velocity_z", power=2)))[:, None] * vehicle.wheel_ahead
     # a steered wheel's way grows with the square of the turn, so the mean's does with its mean square
     hubs = hub_speed(speed[:, None] - turn[:, None] * vehicle.wheel_side, across)
