@@ -79,7 +79,7 @@ void tgi_algebraic(tg_estimator *e, const tg_row *row, const tg_drive *drive, co
     tg_belief *b = &e->belief;
     if (anew) memset(a, 0, sizeof *a);
     tg_real dt = (tg_real)(row->time - e->time);
-    a->gain = dt / (tau + dt);
+    a->gain = anew ? 1 : dt / (tau + dt); /* of the first sample all passes */
 
     tg_real thrust = 0, rim = 0;
     for (int32_t i = 0; i < n; i++) {

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from terragrip.errors import InputError
 
+_UTF8 = "utf-8"
 _BEYOND_ASCII = re.compile(rb"[\x80-\xff]+")
 _GB2312 = re.compile(rb"(?:[\xa1-\xa9\xb0-\xf7][\xa1-\xfe])+")
 HEAD = 1 << 16  # bytes that are looked at
@@ -83,22 +84,28 @@ def to_text(data: bytes, source: str) -> bytes:
     return in_utf8(data)
 
 
-def in_utf8(data: bytes) -> bytes:
-    """Text as UTF-8; what is not UTF-8 is taken for GB 18030 where that makes it Chinese, else for Latin-1."""
+def in_utf8(data: bytes, head: bytes = b"") -> bytes:
+    """Text as UTF-8; what is not UTF-8 is taken for GB 18030 where that makes it Chinese, else for Latin-1.
+
+    ``head``: the first lines of the file that it is a part of. Where these are not UTF-8, all parts are as they are.
+    """
     if data.isascii():
         return data
+    encoding = _encoding_of(head)
+    if encoding == _UTF8:
+        encoding = _encoding_of(data)
+    return data if encoding == _UTF8 else data.decode(encoding, "replace").encode()
+
+
+def _encoding_of(data: bytes) -> str:
+    """UTF-8; or GB 18030 if all that is not ASCII is of its common characters (GB 2312), in runs of two or more; or Latin-1."""
     try:
-        data.decode("utf-8")
+        data.decode(_UTF8)
     except UnicodeDecodeError:
-        return _decoded(data).encode()
-    return data
-
-
-def _decoded(data: bytes) -> str:
-    """Text that is not UTF-8: GB 18030 if all that is not ASCII is of its common characters (GB 2312), in runs of two or more."""
-    runs = _BEYOND_ASCII.findall(data)
-    is_chinese = all(len(run) % 2 == 0 and _GB2312.fullmatch(run) for run in runs) and max(map(len, runs)) > 2
-    return data.decode("gb18030" if is_chinese else "latin-1")
+        runs = _BEYOND_ASCII.findall(data)
+        is_chinese = all(len(run) % 2 == 0 and _GB2312.fullmatch(run) for run in runs)
+        return "gb18030" if is_chinese and max(map(len, runs)) > 2 else "latin-1"
+    return _UTF8
 
 
 def _binary(source: str) -> InputError:

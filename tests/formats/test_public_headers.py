@@ -87,10 +87,17 @@ def test_names_of_public_loggers(name: str, channel: str) -> None:
         "yaw_rate_left",
         "sample_rate_fl",
         "wheel_angle_fl",
+        "wheel_turns_fl",
     ],
 )
 def test_names_that_are_no_speed_of_a_vehicle_or_a_wheel(name: str) -> None:
     assert _channel(name) not in ("wheel_based_speed", "wheel_speed_l", "wheel_speed_fl")
+
+
+@pytest.mark.parametrize("name", ["gps_speed_age_ms", "wheel_speed_fl_delay_ms"])
+def test_an_age_of_a_speed_is_in_milliseconds(name: str) -> None:
+    """They were speeds in m/s, as v_gps_ms is."""
+    assert columns_of((name,), {}, {}, GENERAL)[name].unit == "ms"
 
 
 def test_a_wheels_rate_is_its_speed_and_its_angle_is_none() -> None:
@@ -145,6 +152,18 @@ def test_the_seconds_of_a_minute_are_no_time() -> None:
     clock = TIME[:2220]
     assert find_time({"minute": np.floor(clock / 60), "second": np.floor(clock) % 60}, (), {}) is None
     assert find_time({"second": TIME}, (), {}) is not None
+
+
+@pytest.mark.parametrize("back", [0.0, 0.1])
+def test_a_short_clock_that_was_set_back_is_a_time_all_the_same(back: float) -> None:
+    """'No time column is recognised', of a log of 50 s with one 0 in it, or that begins anew."""
+    zero, anew = TIME[:1000].copy(), np.r_[TIME[:600], TIME[:500] + back]
+    zero[800] = back
+    for name in ("Time (s)", "timestamp"):
+        for stamps in (zero, anew):
+            result = find_time({name: stamps}, (), {})
+            assert result is not None
+            assert result.name == name
 
 
 def test_a_column_named_by_a_unit_of_time_alone_and_lcms_utime() -> None:
@@ -217,6 +236,20 @@ def test_the_encoding_of_a_header(tmp_path: Path, name: str, encoding: str) -> N
     log = tmp_path / "log.csv"
     log.write_bytes(f"time,{name},wheel_speed_l\n{ROWS}\n".encode(encoding))
     assert name in [column.name for column in inspect(log).columns]
+
+
+def test_all_parts_of_a_long_table_are_in_the_encoding_of_its_header(tmp_path: Path) -> None:
+    """Each part was judged alone: 沙 alone is UTF-8, too (ɳ), and by 喆, which GB 2312 lacks, all was Latin-1
+    behind a header that was Chinese, and the first row began in the middle of it."""
+    log, profile = tmp_path / "log.csv", tmp_path / "p.yaml"
+    rows = [f"{k / 100:.2f},2.000000,5.000000,{'喆' if k == 10_000 else '沙'}\n" for k in range(120_000)]
+    log.write_bytes(("time,车速 车速,轮速,soil\n" + "".join(rows)).encode("gbk"))
+    profile.write_text(
+        "channels: {wheel_speed_l: 轮速, ground_speed: 车速 车速, soil: soil}", encoding="utf-8"
+    )
+    recording = read(log, profile)
+    assert len(recording.time) == len(rows)
+    assert set(recording.labels["soil"]) == {"沙", "喆"}
 
 
 def test_a_netcdf_3_file_is_named_and_a_header_that_begins_alike_is_none(tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ def _of_wheels(column: Column) -> list[Candidate]:
         return []  # of the body; a wheel's angular velocity is its speed
     turning = (
         name.has("speed", "rotation")
-        or (of_wheel and name.has("rate"))
+        or (of_wheel and "rate" in name.words)  # its turns, though, are counted
         or (name.has("wheel", "motor") and column.kind in ("speed", "rotation"))
         or (wheel[-1] in "lr" and column.kind == "rotation" and _in_turns(column.unit))  # WS_FL [rpm]
     ) and not (name.has("body") and wheel.isdigit())

@@ -38,7 +38,8 @@ def csv_on_disk(path: str) -> TableOnDisk:
         whole = _text_of(path)  # its lines cannot be determined in its bytes: one block
         dialect = detect(whole, path)
     else:
-        dialect = detect(to_text(head[: head.rindex(b"\n") + 1], path), path)
+        head = head[: head.rindex(b"\n") + 1]
+        dialect = detect(to_text(head, path), path)
     length = length_of(path)
     rows = max(1, round(length / max(len(head), 1) * head.count(b"\n")))
     size = int(np.clip(ROWS * length / rows, 1 << 20, 4 * _BLOCK))
@@ -53,7 +54,7 @@ def csv_on_disk(path: str) -> TableOnDisk:
         for number, (data, is_first) in enumerate(parts):
             if number % every:
                 continue
-            text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"))
+            text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"), head)
             # A byte order mark, comments and the header stand in the first block only.
             start = dialect.start if is_first else 0
             body, written, remarks = body_of(text, dialect, start, more=not is_first)

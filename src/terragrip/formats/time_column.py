@@ -91,9 +91,9 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         return 0.0, "s", ""
     if stated is not None and kind_of(stated) != "time":
         return 0.0, "s", ""
-    back = -float(np.min(np.diff(known)))
-    if back > 0.5 * (np.max(known) - np.min(known)) and np.max(known) < _ROUND and np.min(known) >= 0:
-        return 0.0, "s", ""  # the seconds of a minute, the minutes of an hour
+    back, most = -float(np.min(np.diff(known))), float(np.max(known))
+    if np.min(known) >= 0 and _ROUND - 2 * _step(known) <= most < _ROUND and back > 0.5 * most:
+        return 0.0, "s", ""  # the seconds of a minute, the minutes of an hour; not a clock that was set back
     forward, level = _forward(known), float(np.mean(np.diff(known) >= 0))
     if forward < 0.5 and (level < 0.95 or known[-1] <= known[0]):
         return 0.0, "s", ""

@@ -175,11 +175,11 @@ class Vocabulary:
         if "speed" in concepts and words and words[-1] in _COMPASS:
             concepts.add(_COMPASS[words[-1]])  # VelN, vel_d
             unit = None if unit == "N" else unit
-        if "speed" in concepts and "time" not in concepts:
-            unit = {"kN": "kn", "ms": "m/s"}.get(
-                unit or "", unit
-            )  # speed_kn: knots, no force; no milliseconds
+        if "speed" in concepts and unit == "kN":
+            unit = "kn"  # speed_kn: knots, no force
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
+        if "speed" in concepts and "time" not in concepts and unit == "ms" and not strange:
+            unit = "m/s"  # v_gps_ms: no milliseconds, which speed_age_ms is in
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
 
     def _meant(self, text: list[str]) -> tuple[str, set[str]]:

@@ -1,4 +1,4 @@
-"""The words of the trade, in seven languages and as abbreviations, and the units that words stand for.
+"""The words of the trade, in seven languages, some in Chinese, and as abbreviations, and the units that words stand for.
 
 Not a list of loggers: a word stands here for what it means everywhere.
 """
