@@ -213,13 +213,26 @@ void tgi_track_turn(tg_estimator *e, const tg_row *row)
     e->unseen_turn = row->time - e->yaw_time > 1 || e->settings.articulated ? turn_of_rims(e, row->time) : 0;
 }
 
-/* Whether the row's ground speed is a leap at standstill: while no wheel turns, it counts once it has lasted, since a single one is the sensor's. */
+/* The speed that its torques may have given a vehicle at rest since its last ground speed, the way of `speed`; 0 where they hardly push. */
+static tg_real pushed_to(const tg_estimator *e, const tg_row *row, tg_real speed)
+{
+    const tg_machine *const m = &e->settings.machine;
+    tg_real force = 0;
+    for (int32_t i = 0; i < m->wheels; i++)
+        if (e->settings.driven[i] && e->torque[i].count > 0) force += e->torque[i].calm / m->radius[i];
+    const tg_real acceleration = (speed < 0 ? -force : force) / m->mass;
+    if (!(acceleration > e->settings.watch.thrust * m->gravity)) return 0;
+    return acceleration * (tg_real)(row->time - e->settling[TG_GROUND_SPEED].time);
+}
+
+/* Whether the row's ground speed is a leap at standstill: while no wheel turns, it counts once it has lasted, since a single one is the
+ * sensor's, or where the torques explain it: a sensor may show no slow turn. */
 static int32_t leaps(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *const s = &e->settings;
-    const tg_real speed = row->value[TG_GROUND_SPEED];
+    const tg_real speed = row->value[TG_GROUND_SPEED], least = 2 * (s->standstill_speed + s->noise[TG_GROUND_SPEED]);
     if (isnan(speed)) return 0;
-    if (!e->standing || tgi_fabs(speed) < 2 * (s->standstill_speed + s->noise[TG_GROUND_SPEED])) {
+    if (!e->standing || tgi_fabs(speed) < least + pushed_to(e, row, speed)) {
         e->leap_time = (double)INFINITY;
         return 0;
     }

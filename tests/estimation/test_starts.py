@@ -94,3 +94,24 @@ def test_a_start_makes_no_ground_speed_unsure_between_a_slow_receivers_values():
     slow = np.where(np.arange(len(time)) % 10 == 3, log["ground_speed"], np.nan)
     deviation = estimate(log.with_channels(ground_speed=slow), robot(), held={})["ground_speed_std"]
     assert deviation[(time > 7) & (time < 10)].max() < 3 * deviation[(time > 2) & (time < 5)].max()
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_where_wheels_show_no_slow_turn_a_start_is_by_torque_and_ground_speed(direction: int):
+    """Pulse sensors are silent below .3 m/s. For .6 s the robot stood by its wheels, with adhesions of 0 ± .01 for .3."""
+    made = drive(
+        12.0,
+        rate=50.0,
+        speed=lambda t: 0.5 * np.clip(t - 4, 0, 2) + 1e-9,
+        slip=lambda t: 0.1 * np.clip(2 * (t - 3.9), 0, 1),
+        direction=direction,
+    )
+    wheels = {f"wheel_speed_{w}": made.recording[f"wheel_speed_{w}"] for w in WHEELS}
+    coarse = {name: np.where(np.abs(values) * RADIUS < 0.3, 0.0, values) for name, values in wheels.items()}
+    found, truth = estimate(made.recording.with_channels(**coarse), robot()), made.truth
+    starts = (np.abs(truth["ground_speed"]) > 0.2) & (found.time < 5.5)
+    assert starts.sum() > 40
+    assert not (found["event"][starts] == "standstill").any()
+    for wheel in WHEELS:
+        error = np.abs(found[f"adhesion_{wheel}"] - truth[f"adhesion_{wheel}"])[starts]
+        assert np.mean(error < np.maximum(1.96 * found[f"adhesion_{wheel}_std"][starts], 0.05)) > 0.95
