@@ -59,6 +59,7 @@ def _channel(name: str, *beside: str) -> str:
         ("Torque roda traseira direita (N.m)", "drive_torque_rr"),
         ("Força de tração (kN)", "drawbar_force"),
         ("v_gps_ms", "ground_speed"),
+        ("setup_speed_ms", "ground_speed"),
         ("angular_velocity", "angular_velocity_z"),
         ("/Drive/Gyro/YawVelocityRadPerSec", "angular_velocity_z"),
         ("CAN 1::EBC2::FrontAxleSpeed", "wheel_based_speed"),

@@ -178,7 +178,7 @@ class Vocabulary:
         if "speed" in concepts and unit == "kN":
             unit = "kn"  # speed_kn: knots, no force
         strange = tuple(w for w in text if not self.concepts_of(w) and w.isalpha() and w not in "xyz")
-        if "speed" in concepts and "time" not in concepts and unit == "ms" and not strange:
+        if "speed" in concepts and "time" not in concepts and unit == "ms" and text[-1] not in strange:
             unit = "m/s"  # v_gps_ms: no milliseconds, which speed_age_ms is in
         return Name(_settled(concepts), _wheel_of(words, last, concepts), axis, unit, tuple(words), strange)
 
