@@ -101,6 +101,14 @@ def test_an_age_of_a_speed_is_in_milliseconds(name: str) -> None:
     assert columns_of((name,), {}, {}, GENERAL)[name].unit == "ms"
 
 
+def test_turns_of_unknown_parts_have_a_question_mark_and_those_of_shafts_are_none() -> None:
+    """A belt's were the vehicle's, in deg/s for certain, and a feed's roll in rpm was the vehicle's roll."""
+    spin = 30 + np.sin(TIME)
+    result = _propose({"gps_speed [m/s]": SPEED, "belt_angular_velocity": spin, "Roll speed (rpm)": spin})
+    assert result["angular_velocity_z"].is_doubtful
+    assert "angular_velocity_x" not in result
+
+
 def test_a_wheels_rate_is_its_speed_and_its_angle_is_none() -> None:
     """w1_angle was the speed of wheel 1, and w1_rate nothing."""
     names = [f"w{n}_{what}" for n in range(1, 5) for what in ("angle", "rate")]

@@ -210,14 +210,15 @@ def _of_motion(column: Column) -> list[Candidate]:
     angular = axis and (name.has("gyro") or (rate and (name.has("speed") or "twist" in name.words)))
     turns = column.kind == "rotation" and not name.wheel and not name.has("wheel", "motor")
     by_unit = column.kind == "acceleration"
-    alone = turns and not column.one_of_several and not _in_turns(column.unit)  # no wheel, no shaft
+    shaft = column.kind == "rotation" and _in_turns(column.unit)
+    alone = turns and not column.one_of_several and not shaft
     slope = not _SLOPES.isdisjoint(name.words)
     angle = not name.has("rate", "speed", "rotation", "yaw", "position", "lateral")
     angle &= not (slope and name.axis)  # inclination_x: along it, or about it
     by_angle = (0.7, "a slope") if slope else (0.85, "its name")
     return _first(
         (
-            about and not axis and name.has("rate", "speed"),
+            about and not axis and (rate or (name.has("speed") and not (slope or shaft))),
             f"angular_velocity_{about}",
             0.85,
             "the rate of an angle",
@@ -226,9 +227,9 @@ def _of_motion(column: Column) -> list[Candidate]:
         (angular, gyro, 0.85, "a gyro and an axis"),
         (axis and rate and not name.has("position"), gyro, 0.7, "a rate and an axis"),
         (
-            rate and body and (name.has("speed") or "turn" in name.words),
+            rate and body and not shaft and (name.has("speed") or "turn" in name.words),
             "angular_velocity_z",
-            0.55,
+            0.3 if name.strange else 0.55,  # of a belt, say
             "a rate of turn",
         ),
         (axis and turns, gyro, 0.6, "turns about an axis"),
