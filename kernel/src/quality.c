@@ -221,8 +221,9 @@ static tg_real pushed_to(const tg_estimator *e, const tg_row *row, tg_real speed
     for (int32_t i = 0; i < m->wheels; i++)
         if (e->settings.driven[i] && e->torque[i].count > 0) force += e->torque[i].calm / m->radius[i];
     const tg_real acceleration = (speed < 0 ? -force : force) / m->mass;
-    if (!(acceleration > e->settings.watch.thrust * m->gravity)) return 0;
-    return acceleration * (tg_real)(row->time - e->settling[TG_GROUND_SPEED].time);
+    const tgi_settling *const before = &e->settling[TG_GROUND_SPEED];
+    if (!before->seen || !(acceleration > e->settings.watch.thrust * m->gravity)) return 0;
+    return acceleration * (tg_real)(row->time - before->time);
 }
 
 /* Whether the row's ground speed is a leap at standstill: while no wheel turns, it counts once it has lasted, since a single one is the

@@ -10,6 +10,7 @@ from tests.estimation.drives import BEARING, INERTIA, RADIUS, WHEELS, drive, rob
 
 from terragrip.estimation import estimate
 from terragrip.estimation.engine import EVENTS
+from terragrip.recording import Recording
 from terragrip.simulation.families import Kind, draw
 
 STANDSTILL = EVENTS.index("standstill")
@@ -94,6 +95,18 @@ def test_a_start_makes_no_ground_speed_unsure_between_a_slow_receivers_values():
     slow = np.where(np.arange(len(time)) % 10 == 3, log["ground_speed"], np.nan)
     deviation = estimate(log.with_channels(ground_speed=slow), robot(), held={})["ground_speed_std"]
     assert deviation[(time > 7) & (time < 10)].max() < 3 * deviation[(time > 2) & (time < 5)].max()
+
+
+@pytest.mark.parametrize("origin", [0.0, 1e6])
+def test_the_first_ground_speed_at_standstill_may_leap_at_any_time_of_day(origin: float):
+    """No ground speed before it: torques that push had the clock's whole time to bring it about, and it drove on by one leap."""
+    time = np.arange(0, 6, 0.02)
+    channels = {f"wheel_speed_{w}": 0 * time for w in WHEELS}
+    channels |= {f"drive_torque_{w}": np.full(len(time), 20.0) for w in WHEELS}
+    ground = np.where((np.arange(len(time)) >= 50) & (np.arange(len(time)) % 5 == 0), 0.0, np.nan)
+    ground[50] = 4.0
+    log = Recording(time + origin, channels | {"ground_speed": ground, "drawbar_force": 0 * time})
+    assert (estimate(log, robot())["event"] == "standstill")[5:].all()
 
 
 @pytest.mark.parametrize("direction", [1, -1])
