@@ -33,13 +33,12 @@ def csv_on_disk(path: str) -> TableOnDisk:
     refuse_missing(path, suffixes=SUFFIXES)
     with closing(opened(path)) as stream:
         head = read(stream, HEAD, path)
-    whole = None
+    whole, lines = None, head[: head.rfind(b"\n") + 1] or head
     if b"\n" not in head or head.startswith((b"\xff\xfe", b"\xfe\xff")) or head.count(0) > 0.2 * len(head):
         whole = _text_of(path)  # its lines cannot be determined in its bytes: one block
         dialect = detect(whole, path)
     else:
-        head = head[: head.rindex(b"\n") + 1]
-        dialect = detect(to_text(head, path), path)
+        dialect = detect(to_text(lines, path), path)
     length = length_of(path)
     rows = max(1, round(length / max(len(head), 1) * head.count(b"\n")))
     size = int(np.clip(ROWS * length / rows, 1 << 20, 4 * _BLOCK))
@@ -54,7 +53,7 @@ def csv_on_disk(path: str) -> TableOnDisk:
         for number, (data, is_first) in enumerate(parts):
             if number % every:
                 continue
-            text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"), head)
+            text = in_utf8(data.removeprefix(b"\xef\xbb\xbf"), lines)
             # A byte order mark, comments and the header stand in the first block only.
             start = dialect.start if is_first else 0
             body, written, remarks = body_of(text, dialect, start, more=not is_first)
