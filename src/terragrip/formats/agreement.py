@@ -39,7 +39,11 @@ class Agreement:
         self._accelerations(ranked)
         self._turning(ranked)
         Rims(self._evidence, self._vehicle).judge(
-            ranked, self._ground(ranked), path, self._turns_of_body(ranked), self._assumed(ranked)
+            ranked,
+            self._ground(ranked),
+            path,
+            self._turns_of_body(ranked),
+            self._ground(ranked, assumed=True),
         )
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
@@ -161,23 +165,18 @@ class Agreement:
         doubt = "the wheels' own speed, beside one over ground?" if guess.column.name.strange else ""
         return replace(guess, confidence=0.6, evidence=(*guess.evidence, sentence), doubt=doubt)
 
-    def _ground(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
-        """The best ground speed and its factor to m/s, where its unit is beyond doubt."""
+    def _ground(
+        self, ranked: Mapping[str, list[Guess]], *, assumed: bool = False
+    ) -> tuple[str, float] | None:
+        """The best ground speed and its factor to m/s, where its unit is beyond doubt, or ``assumed``: where it is the likely one."""
         best = surest(ranked, "ground_speed")
-        if best is None or best.unit is None or best.contradicted:
+        if best is None or best.unit is None:
             return None
-        if (best.doubt or best.unit_doubt) and best.column.unit is None:
+        if assumed:
+            return None if best.doubt else (best.column.column, factor_to(best.unit, "m/s"))
+        if best.contradicted or ((best.doubt or best.unit_doubt) and best.column.unit is None):
             return None
         return best.column.column, factor_to(best.unit, "m/s")
-
-    def _assumed(self, ranked: Mapping[str, list[Guess]]) -> tuple[str, float] | None:
-        """The best ground speed and its factor to m/s in its likely unit, though nothing states it."""
-        best = surest(ranked, "ground_speed")
-        return (
-            None
-            if best is None or best.unit is None or best.doubt
-            else (best.column.column, factor_to(best.unit, "m/s"))
-        )
 
     def _accelerations(self, ranked: Ranked) -> None:
         """Accelerations by gravity in the sum of three, and along the vehicle by the derivative of its speed."""

@@ -150,7 +150,7 @@ def _by_name(column: Column) -> list[Candidate]:
         and not column.name.has("command", "statistic", "odometry")
     ):
         return [Candidate(last, 1.0, "Terragrip's own name")]
-    standard = _on_the_bus().get(last) or _on_the_bus().get(_written_out(last))
+    standard = _on_the_bus().get(_written_out(last))
     if standard is not None:
         return [Candidate(standard, 0.95, ON_THE_BUS)]
     if _BRAKE.search("".join(column.name.words)) and not column.name.has("command"):
@@ -326,8 +326,8 @@ def _tractor() -> Profile:
 @cache
 def _on_the_bus() -> dict[str, str]:
     """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
-    names = {name: channel for channel, source in _tractor().channels.items() for name in source.candidates}
-    return names | {_written_out(name): channel for name, channel in names.items()}
+    channels = _tractor().channels.items()
+    return {_written_out(name): channel for channel, source in channels for name in source.candidates}
 
 
 def _written_out(name: str) -> str:

@@ -64,10 +64,12 @@ def of_a_long_table(
 ) -> list[str]:
     """A sentence on a table with a row for each value: a text column names the signals, and another column holds their values."""
     value = next((name for name in numbers if _VALUES.fullmatch(name)), None)
+    if value is None:
+        return []
     unit = next((name for name in texts if _UNITS.fullmatch(name)), None)
     for name, cells in texts.items():
         count = len(set(cells[:_ROWS]) - {None, ""})
-        if value is not None and name != unit and name not in LABELS and 1 < count <= 0.1 * len(cells):
+        if name != unit and name not in LABELS and 1 < count <= 0.1 * len(cells):
             columns = f't["{name}"] + " [" + t["{unit}"] + "]"' if unit else f'"{name}"'
             return [
                 f"{value} holds the values of {count} signals, which {name} names, a row for each value. Make a column of each signal, by "

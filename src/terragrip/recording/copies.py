@@ -36,12 +36,12 @@ def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     notes = [
         f"{', '.join(group)} are one signal: how wheels share it was not measured, so only their mean adhesion is. Single wheels' "
         "intervals hold an open differential's friction, no lock. If it is the sum of their torques, divide it ('scale:' in the profile)."
-        for group in _groups(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
+        for group in one_signal(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
     turns, pairs = _turns(recording, vehicle), []
     for axle in vehicle.axles.values():
         names = [f"wheel_speed_{wheel}" for wheel in (axle.wheels[0], axle.wheels[-1])]
-        own = len(axle.wheels) < 2 or not _groups(recording, names, turns)
+        own = len(axle.wheels) < 2 or not one_signal(recording, names, turns)
         if not own and not _is_of_the_ground(recording, names[0]):
             pairs.append(" and ".join(names))
     if pairs:
@@ -63,8 +63,8 @@ def _turns(recording: Recording, vehicle: Vehicle) -> bool:
     return bool(np.sum((pace > DRIVING * usual) & (apart > _APART * pace)) > _FEW)
 
 
-def _groups(recording: Recording, names: list[str], noiseless: bool = False) -> list[list[str]]:
-    """Columns that are in proportion to each other, noise included unless it need not be there (``noiseless``)."""
+def one_signal(recording: Recording, names: list[str], noiseless: bool = False) -> list[list[str]]:
+    """Groups of columns that are in proportion to each other, noise included unless it need not be there (``noiseless``)."""
     left = [name for name in names if name in recording.channels]
     groups = []
     while left:

@@ -92,9 +92,8 @@ def _of_axle(
     driving = np.logical_and.reduce([one > DRIVING * quantile(np.abs(one), 0.95) for one in raw])
     ratio = np.full(len(recording), np.nan)
     ratio[driving] = np.log(raw[0][driving] / raw[1][driving])
-    ratio[~even[np.searchsorted((when[1:] + when[:-1]) / 2, recording.time)]] = (
-        np.nan
-    )  # steps of a tight turn
+    tight = ~even[np.searchsorted((when[1:] + when[:-1]) / 2, recording.time)]
+    ratio[tight] = np.nan  # its steps are the turn's
     instant = _instant(recording.time, ratio, when[rows], at, size)
     if instant is None:
         return []

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.copies import one_signal
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import longest
@@ -155,16 +156,18 @@ def slower_warnings(
     measured = np.isfinite(ground)
     noise = vehicle.sensors.ground_speed or white_noise(recording.time[measured], ground[measured]) or 0.0
     found: dict[str, tuple[float, float]] = {}
-    wheels: dict[str, tuple[Floats, Floats]] = {}
+    wheels: dict[str, Floats] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
         if spin is not None and torque is not None:
             rim = radius * window_means(spin, means.place, means.count)[means.rows]
-            wheels[wheel] = torque, np.array([rim, means.speed - slowed[wheel], means.of(torque) / radius])
-    for wheel, (torque, _) in wheels.items():
-        # How wheels share one signal was not measured: behind a lock the outer one brakes in a turn.
-        alike = [state for other, state in wheels.values() if np.array_equal(other, torque, equal_nan=True)]
-        rim, hub, thrust = np.mean(alike, axis=0)
+            wheels[wheel] = np.array([rim, means.speed - slowed[wheel], means.of(torque) / radius])
+    # How wheels share one torque was not measured: behind a lock the outer one brakes in a turn.
+    groups = one_signal(recording, [f"drive_torque_{wheel}" for wheel in wheels])
+    for wheel in wheels:
+        name = f"drive_torque_{wheel}"
+        alike = next((group for group in groups if name in group), [name])
+        rim, hub, thrust = np.mean([wheels[one.removeprefix("drive_torque_")] for one in alike], axis=0)
         rows = (hub - rim > slower * hub) & (thrust > least) & usable
         stretch = longest(when, rows, np.isfinite(hub - rim) & np.isfinite(thrust))
         if stretch is None:
