@@ -8,6 +8,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+import can
 import cantools
 import numpy as np
 import pytest
@@ -16,11 +17,11 @@ from hypothesis import strategies as st
 
 from can_frames import START, WHEEL_BASED, drive, payload, write_log
 from terragrip.errors import InputError
-from terragrip.formats.can.bits import Field
+from terragrip.formats.can.bits import Field, leaps
 from terragrip.formats.can.catalog import EXTENDED, Catalog, catalog, group_of, message_of
 from terragrip.formats.can.decoding import signals_of
 from terragrip.formats.can.frames import Frames
-from terragrip.formats.reading import read, read_table
+from terragrip.formats.reading import read, read_log, read_table
 
 DBC = """VERSION ""
 NS_ :
@@ -456,3 +457,70 @@ def test_bad_lines_are_left_out_and_the_first_is_named(tmp_path: Path, form: str
     assert any(note.startswith("3 lines have no frame, the first is line 21 (") for note in table.notes)
     unwanted = read_table(damaged, lambda name: name == "GroundBasedMachineSpeed")
     assert any("the first is line 21 (" in note for note in unwanted.notes)
+
+
+BUSES = """VERSION ""
+NS_ :
+BS_:
+BU_: ECU
+BO_ 256 Drive: 8 ECU
+ SG_ speed : {at[0]}|16@{order}- (0.01,0) [0|0] "m/s" ECU
+ SG_ torque : {at[1]}|16@{order}- (0.1,0) [0|0] "Nm" ECU
+BO_ 257 Still: 8 ECU
+ SG_ other : 0|16@1- (0.01,0) [0|0] "" ECU
+"""
+SENT = 2 + np.sin(np.arange(400) / 30)
+
+
+def _sent(tmp_path: Path, *, order: int = 1, second_bus: bool = False, suffix: str = "blf") -> list[Path]:
+    at = (0, 16) if order else (7, 23)
+    (tmp_path / "machine.dbc").write_text(BUSES.format(at=at, order=order))
+    with can.Logger(tmp_path / f"log.{suffix}") as log:
+        for k, speed in enumerate(SENT):
+            data = struct.pack("<hhxxxx", round(100 * speed), round(-300 * speed))
+            for number, payload_ in enumerate((data, bytes(8))[: 1 + second_bus]):
+                log.on_message_received(
+                    can.Message(
+                        timestamp=START + 0.02 * k + 0.001 * number,
+                        arbitration_id=256,
+                        is_extended_id=False,
+                        data=payload_,
+                        channel=number,
+                    )
+                )
+    return [tmp_path / f"log.{suffix}", tmp_path / "machine.dbc"]
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
+def test_a_message_on_two_buses_is_two_signals(tmp_path: Path, suffix: str) -> None:
+    """Two controllers of one type, each on a bus of its own, were one signal that jumped from one to the other, silently."""
+    log, dbc = _sent(tmp_path, second_bus=True, suffix=suffix)
+    read = read_log(log, databases=(str(dbc),))
+    assert np.allclose(read.signals["speed"].values, SENT, atol=0.006)
+    assert not read.signals["speed@bus1"].values.any()
+    assert any("speed has several senders; it is taken from bus 0" in note for note in read.notes)
+
+
+def test_a_message_on_one_bus_has_no_second_name(tmp_path: Path) -> None:
+    log, dbc = _sent(tmp_path)
+    read = read_log(log, databases=(str(dbc),))
+    assert set(read.names) == {"speed", "torque"}
+    assert not read.notes
+
+
+def test_a_dbc_in_the_wrong_byte_order_is_refused(tmp_path: Path) -> None:
+    """All signals were noise over their whole range, proposed without a question mark."""
+    log, dbc = _sent(tmp_path, order=0)
+    with pytest.raises(
+        InputError, match=r"by the DBC speed, torque leap .* would not in the other byte order"
+    ):
+        read_log(log, databases=(str(dbc),))
+
+
+def test_what_leaps_in_either_byte_order_is_noise() -> None:
+    noise = np.random.default_rng(0).integers(-30000, 30000, (400, 1)).astype("<i2").view(np.uint8)
+    steps = np.repeat(np.arange(20, dtype="<i2"), 20)[:, None].view(np.uint8)
+    for data in (noise, steps):
+        assert not any(
+            leaps(Field("x", at, 16, order, signed=True), data) for at, order in ((0, True), (7, False))
+        )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from terragrip.formats.can.catalog import EXTENDED, catalog
+from terragrip.formats.can.catalog import EXTENDED, catalog, with_buses
 from terragrip.formats.can.frames import Frames
 from terragrip.formats.can.log import finished
 from terragrip.formats.registry import Databases, Format
@@ -120,6 +120,8 @@ def _frames(file: Any, group: int) -> Iterator[tuple[npt.NDArray[Any], ...]]:
         identifiers = fields[f"{_FRAME}.ID"].astype(np.int64) & 0x1FFFFFFF
         wide = fields[f"{_FRAME}.IDE"] > 0 if f"{_FRAME}.IDE" in fields.dtype.names else identifiers > 0x7FF
         identifiers |= np.where(wide, EXTENDED, 0)
+        if f"{_FRAME}.BusChannel" in fields.dtype.names:
+            identifiers = with_buses(identifiers, fields[f"{_FRAME}.BusChannel"])
         data = _payloads(fields[f"{_FRAME}.DataBytes"])
         lengths = np.minimum(fields[f"{_FRAME}.DataLength"].astype(np.int64), data.shape[1])
         yield np.asarray(block.timestamps, dtype=np.float64), identifiers, lengths, data

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from terragrip.formats.can.bits import decode
-from terragrip.formats.can.catalog import EXTENDED, Message, catalog, source_of
+from terragrip.formats.can.catalog import EXTENDED, Message, catalog, sender_of
 from terragrip.formats.can.transport import Transport, is_part
 from terragrip.live.payload import Fields
 
@@ -66,6 +66,6 @@ class FrameDecoder:
         message = self._catalog.message_of(key)
         if message is None:
             return None
-        names = self._catalog.names(message, source_of(key))
+        names = self._catalog.names(message, sender_of(key, message))
         wanted = {field: [name for name in every if self._wants(name)] for field, every in names.items()}
         return message, {field: own for field, own in wanted.items() if own}

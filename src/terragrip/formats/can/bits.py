@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,13 @@ import numpy.typing as npt
 from terragrip.arrays import Bools, Floats
 
 Bytes = npt.NDArray[np.uint8]
+
+_SHORTEST = 50  # payloads that show a byte order
+_NOISY, _SMOOTHER = (
+    0.3,
+    3.0,
+)  # mean step over mean deviation in a wrong byte order, and over that in the right one, at least
+_ACROSS, _NEAR = 0.7, 0.1  # largest step over the range: in a wrong order at least, in the right one at most
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,30 @@ def raw_of(field: Field, data: Bytes) -> npt.NDArray[np.uint64]:
     words = np.zeros((len(data), 8), dtype=np.uint8)
     words[:, : packed.shape[1]] = packed
     return words.view("<u8")[:, 0].astype(np.uint64, copy=False)
+
+
+def leaps(field: Field, data: Bytes) -> bool:
+    """Whether a field of whole bytes leaps from payload to payload (n, bytes), and would not in the other byte order.
+
+    White noise steps by 1.1 times its mean deviation, in either order. A smooth signal whose bytes are exchanged does so, too, or from
+    one end of its range to the other where its low byte begins anew.
+    """
+    turned = 7 - field.start % 8 if field.little_endian else field.start % 8
+    if field.length not in (16, 24, 32) or field.floating or turned != 7 or len(data) < _SHORTEST:
+        return False
+    start = 8 * (field.start // 8) + (7 if field.little_endian else 0)
+    other = replace(field, start=start, little_endian=not field.little_endian)
+    (mean, most), (mean_of_other, most_of_other) = _steps(field, data), _steps(other, data)
+    return mean > max(_NOISY, _SMOOTHER * mean_of_other) or (most > _ACROSS and most_of_other < _NEAR)
+
+
+def _steps(field: Field, data: Bytes) -> tuple[float, float]:
+    """From payload to payload (n, bytes), the mean step of a field over its mean deviation, and the largest over its range."""
+    values = physical(field, raw_of(field, data))
+    steps, reach = np.abs(np.diff(values)), float(np.ptp(values))
+    if not reach:
+        return 0.0, 0.0
+    return float(steps.mean() / np.abs(values - values.mean()).mean()), float(steps.max() / reach)
 
 
 def physical(field: Field, raw: npt.NDArray[np.uint64]) -> Floats:

@@ -10,6 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from terragrip.arrays import Ints
 from terragrip.document import read_yaml
 from terragrip.errors import InputError
 from terragrip.files import refuse_missing
@@ -18,6 +22,9 @@ from terragrip.formats.can.bits import Field
 
 EXTENDED = 1 << 31
 """Set in an identifier of 29 bits, as in a DBC."""
+_BUS, _MOST_BUSES = 32, 1 << 16  # bits of an identifier, above which its frame's bus stands
+NO_SENDER = -1
+"""The sender of a message that names none in a log that names no bus."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +49,34 @@ def source_of(identifier: int) -> int:
     return identifier & 0xFF
 
 
+def on_bus(identifier: int, bus: object) -> int:
+    """An identifier with its frame's bus, as the log numbers it; as it is where there is no number."""
+    return identifier | (bus + 1) << _BUS if isinstance(bus, int) and 0 <= bus < _MOST_BUSES else identifier
+
+
+def with_buses(identifiers: Ints, buses: npt.NDArray[Any]) -> Ints:
+    """Identifiers (n,), each with the number of its frame's bus."""
+    return identifiers | (buses.astype(np.int64) + 1) << _BUS
+
+
+def sender_of(identifier: int, message: Message) -> int:
+    """Who sent a message: an address, or below `NO_SENDER` a bus where the message names no sender."""
+    return source_of(identifier) if message.by_group else NO_SENDER - (identifier >> _BUS)
+
+
+def without_bus(identifier: int) -> int:
+    """An identifier as it was on its bus."""
+    return identifier & ((1 << _BUS) - 1)
+
+
 def of_sender(name: str, sender: int) -> str:
-    """The name of one sender's signal: ``Name@F0``."""
-    return f"{name}@{sender:02X}"
+    """The name of one sender's signal: ``Name@F0``, or ``Name@bus1``."""
+    return f"{name}@{sender:02X}" if sender >= 0 else f"{name}@bus{NO_SENDER - 1 - sender}"
+
+
+def place_of(sender: int) -> str:
+    """A sender in words: ``address 80 hex``, ``bus 1``."""
+    return f"address {sender:02X} hex" if sender >= 0 else f"bus {NO_SENDER - 1 - sender}"
 
 
 class Catalog:
@@ -76,6 +108,7 @@ class Catalog:
 
     def message_of(self, identifier: int) -> Message | None:
         """The message of a frame's identifier (`EXTENDED` set where it has 29 bits); None if it is unknown."""
+        identifier = without_bus(identifier)
         result = self._table.get((False, identifier))
         if result is None and identifier & EXTENDED:
             result = self._table.get((True, group_of(identifier)))
@@ -86,9 +119,9 @@ class Catalog:
         return field.name if self._seen[field.name] == 1 else f"{message.name}.{field.name}"
 
     def names(self, message: Message, sender: int) -> dict[str, tuple[str, ...]]:
-        """By a message's fields the names of their signals: the plain one, and of a parameter group that of its sender."""
+        """By a message's fields the names of their signals: the plain one, and that of its sender or bus, where it has one."""
         plain = {field.name: self.name(message, field) for field in message.fields}
-        return {f: (n, of_sender(n, sender)) if message.by_group else (n,) for f, n in plain.items()}
+        return {f: (n,) if sender == NO_SENDER else (n, of_sender(n, sender)) for f, n in plain.items()}
 
 
 def catalog(databases: Sequence[str | os.PathLike[str]] = ()) -> Catalog:

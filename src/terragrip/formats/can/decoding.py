@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from terragrip.formats.can.bits import decode
-from terragrip.formats.can.catalog import EXTENDED, Message, group_of, of_sender
+from terragrip.formats.can.bits import decode, leaps
+from terragrip.formats.can.catalog import EXTENDED, Message, group_of, of_sender, place_of
 from terragrip.formats.can.frames import Block, Frames
 from terragrip.formats.signals import Signal
 
@@ -38,7 +38,9 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
     """
     frames.flush()
     result: dict[str, Signal] = {}
-    best: dict[str, tuple[int, int]] = {}  # plain name: valid samples, and the sender's address made negative
+    best: dict[
+        str, tuple[int, int, int]
+    ] = {}  # plain name: valid samples, what prefers low addresses and buses, the sender
     several: set[str] = set()
     for (name, sender), kept in frames.kept.items():
         if not kept:  # its lines could not be read
@@ -48,8 +50,8 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
         for plain, signal in _decoded(frames, message, sender, kept).items():
             if shared and frames.wanted(of_sender(plain, sender)):
                 result[of_sender(plain, sender)] = signal
-            rank = int(np.isfinite(signal.values).sum()), -sender
-            if frames.wanted(plain) and rank > best.get(plain, (-1, 0)):
+            rank = int(np.isfinite(signal.values).sum()), -abs(sender), sender
+            if frames.wanted(plain) and rank > best.get(plain, (-1, 0, 0)):
                 best[plain], result[plain] = rank, signal
                 several |= {plain} if shared else set()
     return result, [*_on_senders(best, several), *_on_missing(result), *_on_frames(frames)]
@@ -66,14 +68,18 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
         data[row : row + len(part), : part.shape[1]] = part
         row += len(part)
     values = decode(message.fields, wanted, data, lengths)
+    by_name = {f.name: f for f in message.fields if message.name in frames.catalog.given}
+    for name in [n for n in by_name if n in values and leaps(by_name[n], data[np.isfinite(values[n])])]:
+        frames.leaping += [names[name][0]] * (names[name][0] not in frames.leaping)
+        del values[name]
     time = time if frames.tick == 1.0 else time * frames.tick
     units = {f.name: f.unit for f in message.fields}
     return {names[field][0]: Signal(time, column, units[field]) for field, column in values.items()}
 
 
-def _on_senders(best: dict[str, tuple[int, int]], several: set[str]) -> list[str]:
+def _on_senders(best: dict[str, tuple[int, int, int]], several: set[str]) -> list[str]:
     return [
-        f"{name} has several senders; it is taken from address {-best[name][1]:02X} hex, which has the most valid samples."
+        f"{name} has several senders; it is taken from {place_of(best[name][2])}, which has the most valid samples."
         for name in sorted(several)
     ]
 

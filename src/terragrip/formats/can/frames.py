@@ -8,16 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.formats.can.catalog import Catalog, Message, source_of
+from terragrip.formats.can.catalog import Catalog, Message, sender_of, without_bus
 from terragrip.formats.can.transport import Transport, is_part
 from terragrip.formats.table import EVERY, Wanted, every_of, skips
 
 _BLOCK = 20_000  # frames that are sorted, read or left out together
-NO_SENDER = -1
-"""The sender of a message that does not name one."""
 
 Frame = tuple[float, int, bytes]
-"""Stamp [s], identifier with `EXTENDED` set where it has 29 bits, payload."""
+"""Stamp [s], identifier with `EXTENDED` set where it has 29 bits and its bus (`on_bus`), payload."""
 Bytes = npt.NDArray[np.uint8]
 Block = tuple[Floats, npt.NDArray[np.uint16], Bytes]
 """Stamps (n,) [s], lengths (n,) and payloads (n, bytes) of frames."""
@@ -30,7 +28,8 @@ class Frames:
     """Takes the frames of a log and keeps those of wanted signals.
 
     ``kept`` (blocks of payloads) and ``seen``: by message name and sender. ``unknown``: frames by identifier that the catalog lacks.
-    All speak of the frames up to the last `flush`. ``tick``: seconds that the stamps count.
+    All speak of the frames up to the last `flush`. ``tick``: seconds that the stamps count. ``leaping``: signals left out, since a DBC
+    seems to have the wrong byte order for them.
     """
 
     catalog: Catalog
@@ -41,6 +40,7 @@ class Frames:
     kept: dict[tuple[str, int], list[Block]] = field(default_factory=dict)
     seen: dict[tuple[str, int], Message] = field(default_factory=dict)
     unknown: dict[int, int] = field(default_factory=dict)
+    leaping: list[str] = field(default_factory=list)
     transport: Transport = field(default_factory=Transport)
     _routes: dict[tuple[int, bool], Route] = field(default_factory=dict)
     _waiting: list[Frame] = field(default_factory=list)
@@ -84,8 +84,8 @@ class Frames:
                 route.append((time[rows], held, data[rows, : held.max()]))
             elif route is not None:
                 parts |= rows  # whose order counts
-            elif identifier in self.unknown:
-                self.unknown[identifier] += int(rows.sum())
+            elif (bare := without_bus(identifier)) in self.unknown:
+                self.unknown[bare] += int(rows.sum())
         put_together: list[Frame] = []
         for k in np.flatnonzero(parts).tolist():
             message = self.transport.add(int(identifiers[k]), data[k, : lengths[k]].tobytes())
@@ -109,8 +109,8 @@ class Frames:
     def pass_by(self, identifier: int) -> None:
         """Count a data frame of which nothing is wanted."""
         self.count += 1
-        if identifier in self.unknown:
-            self.unknown[identifier] += 1
+        if (bare := without_bus(identifier)) in self.unknown:
+            self.unknown[bare] += 1
 
     def senders(self, message: Message) -> int:
         """How many have sent a message."""
@@ -127,9 +127,9 @@ class Frames:
         if not whole and is_part(identifier, message):
             return self.transport
         if message is None:
-            self.unknown[identifier] = 0
+            self.unknown.setdefault(without_bus(identifier), 0)
             return None
-        sender = source_of(identifier) if message.by_group else NO_SENDER
+        sender = sender_of(identifier, message)
         self.seen[message.name, sender] = message
         names = self.catalog.names(message, sender).values()
         if not any(self.wanted(name) for every in names for name in every):

@@ -29,13 +29,14 @@ from terragrip.formats.can.text_logs import (
 )
 from terragrip.formats.registry import Databases, Format
 from terragrip.formats.signals import SignalLog
-from terragrip.formats.table import Wanted
+from terragrip.formats.table import Sparse, Wanted
 
 _TOO_SHORT = re.compile(
     rb"LOBJ.{4}[\x00-\x0f]\x00{3}", re.DOTALL
 )  # signature, header's size and version, the object's size
 _LONGEST = 4096  # characters of a line
 _MOST_BAD = 0.5  # share of lines without a frame from which a file is none of its kind
+_ORDERS = "correct it there: @1 is little-endian, @0 big-endian"
 _BUSY = 20.0  # frames a second: a bus that speaks less is one whose stamps are taken for seconds by mistake
 
 Parse = Callable[[Iterator[str], Count, Frames], Iterator[Frame]]
@@ -104,6 +105,12 @@ def finished(
             hint="give the bus's DBC: --dbc FILE, or 'dbc:' in the profile",
         )
     signals, remarks = signals_of(frames)
+    if leaping := frames.leaping:
+        what = ", ".join(leaping[:4]) + (f" and {len(leaping) - 4} more" if len(leaping) > 4 else "")
+        problem = f"by the DBC {what} leap from frame to frame, and would not in the other byte order"
+        if not signals or not isinstance(frames.wanted, Sparse):
+            raise InputError(problem, file=path, hint=_ORDERS)
+        remarks += [f"{problem[0].upper()}{problem[1:]}: left out; {_ORDERS}."]
     return SignalLog(names_of(frames), signals, notes=(*notes, *remarks))
 
 

@@ -13,13 +13,13 @@ from datetime import UTC, datetime
 from typing import Any
 
 from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.can.catalog import EXTENDED
+from terragrip.formats.can.catalog import EXTENDED, on_bus
 from terragrip.formats.can.frames import Frame, Frames
 
 Numbered = tuple[int, str]
 """A line's number, and the line."""
 
-_TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+\S+\s+"
+_TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+\S*?(\d*)\s+"  # and the interface's number
 # (1600000000.000000) can0 18FE4800#0000030405060708 R
 _COMPACT = re.compile(
     _TIME + r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?:#[0-9A-Fa-f])?([0-9A-Fa-f]*)(?:\s+[RT])?\s*$"
@@ -49,6 +49,7 @@ _TIMES = dict.fromkeys(("timestamp", "time", "timestampepoch", "time_s", "t"), 1
 _IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
 _DATA = ("data", "databytes", "payload", "data_hex")
 _SOURCES, _EXTENDED = ("source", "src", "sa"), ("extended", "ide")
+_BUSES = ("bus", "channel")
 _YES, _NO = ("1", "true"), ("", "0", "false")
 
 # What the first lines of each form look like.
@@ -124,23 +125,24 @@ def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Fram
 
 def _candump(lines: Iterable[Numbered], count: Count, frames: Frames | None) -> Iterator[Frame]:
     """Frames with their stamps as they are; lines that ``frames`` has no use for are passed by."""
-    unwanted: dict[str, int] = {}  # identifiers by what stands before the payload
+    unwanted: dict[str, int] = {}  # identifiers by what stands between stamp and payload
     for number, line in lines:
         mark = line.find("#")
-        head = line[max(mark - 8, 0) : mark]
+        head = line[line.find(")") + 1 : mark]  # the interface, too
         if frames is not None and head in unwanted:
             frames.pass_by(unwanted[head])
             continue
         if frames is not None and frames.leaves_out_next():
             continue
         match = _COMPACT.match(line) or _SPACED.match(line)
-        data = "" if match is None else "".join(match[3].split())
+        data = "" if match is None else "".join(match[4].split())
         if match is None or len(data) % 2:
             if line.strip() and not _NO_DATA.search(line):
                 count.add(number, line)
                 count.unstamped = count.unstamped or bool(_UNSTAMPED.match(line))
             continue
-        identifier = int(match[2], 16) | (EXTENDED if len(match[2]) == _EIGHT else 0)
+        identifier = int(match[3], 16) | (EXTENDED if len(match[3]) == _EIGHT else 0)
+        identifier = on_bus(identifier, int(match[2]) if match[2] else None)
         # Only log files, whose lines have no blanks in the payload, are of the size that makes this worth while.
         if frames is not None and mark > 0 and frames.are_unwanted(identifier):
             unwanted[head] = identifier
@@ -161,7 +163,8 @@ def frames_of(messages: Iterable[Any]) -> Iterator[Frame]:
     for message in messages:
         if not (message.is_error_frame or message.is_remote_frame):
             wide = EXTENDED if message.is_extended_id else 0
-            yield message.timestamp, message.arbitration_id | wide, bytes(message.data)
+            identifier = on_bus(message.arbitration_id | wide, message.channel)
+            yield message.timestamp, identifier, bytes(message.data)
 
 
 def asc(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
@@ -267,7 +270,9 @@ def table(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]
                 continue
             (time, scale), *_ = ((row[name], _TIMES[name]) for name in names if name in _TIMES)
             payload = _payload(next(row[name] for name in names if name in _DATA))
-            yield scale * float(time.replace(",", ".")), _identifier(row), payload
+            bus = next((row[name].strip() for name in _BUSES if name in row), "")
+            identifier = on_bus(_identifier(row), int(bus) if bus.isdecimal() else None)
+            yield scale * float(time.replace(",", ".")), identifier, payload
         except (ValueError, binascii.Error):
             count.add(number, line)
 
