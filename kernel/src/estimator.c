@@ -96,7 +96,9 @@ static int32_t advance(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_i
     tgi_follow(e, &e->deviations);
     watch_shocks(e, &step, r[s->machine.wheels + 1], dt);
     watch_consistency(e, row, &step, r);
-    tgi_watch_innovation(e, row, step.innovation[s->machine.wheels], step.innovation_variance[s->machine.wheels]);
+    const tg_real innovation = step.innovation[s->machine.wheels], variance = step.innovation_variance[s->machine.wheels];
+    tgi_watch_innovation(e, row, innovation, variance);
+    if (!isnan(innovation) && !row->reckoned && !e->slope.running) tgi_watch_draw(e, innovation, variance, 1 - row->ground_variance / variance);
     e->belief.supervisor = supervisor_of(e, &step);
     return 1;
 }
@@ -181,6 +183,7 @@ static void report(tg_estimator *e, const tg_row *row, const tg_drive *drive, tg
     e->scene.disputed = tgi_disputed_variance(e, drive);
     e->scene.late = tgi_late_variance(e, drive);
     tgi_traction(&e->settings, e->warped.now, &e->belief, (const tg_real(*)[TG_MAX_CONSIDERED])e->consider.s, &e->scene, o);
+    tgi_watch_signs(e, o);
     o[TG_OUT_SUPERVISOR] = e->belief.supervisor;
     for (int32_t k = 0; k < e->settings.axles; k++) o[TG_OUT_VERTICAL_LOAD + k] = drive->axle_load[k];
 }
@@ -300,7 +303,7 @@ static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, 
     tgi_watch_over(e, row, &drive, !blind && moves, blind || (moves && course != TG_GO) || breaks, dt, out->value);
     out->event = tgi_event_of(e, row, gap || blind || course == TG_WAIT, lost);
     const int32_t learn = out->event == TG_EVENT_NONE || out->event == TG_EVENT_IMMOBILIZATION;
-    tgi_curves(e, flows && learn && !row->outlier, dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
+    tgi_curves(e, flows && learn && !row->outlier && !(e->slip_memory.astray > 0), dt, e->standing ? 0 : travelled * dt, drive.load, out->value);
 }
 
 tg_status tg_estimator_update(tg_estimator *e, const tg_sample *sample, tg_estimate *out)

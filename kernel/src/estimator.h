@@ -61,7 +61,8 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real unseen_load; /* relative variance of a wheel's load */
     tg_real slow_speed; /* variance of the ground speed's slow error, see slow_speed.c, */
     tg_real disputed;   /* of what its sensor and the forces disagree on, and of its samples' age, */
-    tg_real late;       /* and of its delay */
+    tg_real late;       /* and of its delay; */
+    tg_real astray;     /* of a receiver that contradicts forces and wheels (reckoning.c) */
     tg_real anew; /* the filter was restarted: nothing links this row to the one before */
 } tgi_scene;
 
@@ -243,6 +244,8 @@ void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
 /* reckoning.c */
 void tgi_reset_slips(tg_estimator *e);
 void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt);
+void tgi_watch_signs(tg_estimator *e, const tg_real *o);
+void tgi_watch_draw(tg_estimator *e, tg_real innovation, tg_real variance, tg_real gain);
 void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q);

@@ -37,7 +37,7 @@ static void add_wheel(side_view *side, tg_real slip, tg_real deviation, tg_real 
 static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, tg_real speed, tg_real rim)
 {
     const tg_real relative = (tgi_square(deviation) - turn) * tgi_square(speed / rim);
-    return tgi_sqrt(tgi_max(relative - (scene->late + scene->disputed) / tgi_square(speed), 0));
+    return tgi_sqrt(tgi_max(relative - (scene->late + scene->disputed + scene->astray) / tgi_square(speed), 0));
 }
 
 /* Slip by the newest measured ground speed, of an estimate by torques: that believes forces, too, and is late where slip runs away. The

@@ -3,6 +3,10 @@
  * ahead: what the vehicle usually slips, and how far from that it was while this was measured, take its place. */
 #include "estimator.h"
 
+#define TG_DRAWN 2             /* s over which it is summed what ground speeds draw the estimate by */
+#define TG_AGREED 5            /* s that speed, forces and wheels agree again: a drift may pass through what they agree on */
+#define TG_BEYOND ((tg_real)9) /* square of the SDs beyond which that, and a slip, are no chance */
+
 void tgi_reset_slips(tg_estimator *e)
 {
     tgi_slip_memory *m = &e->slip_memory;
@@ -64,14 +68,6 @@ static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, 
     m->apart += share * (tgi_square(away) - m->apart);
 }
 
-/* After a row whose ground speed was measured: remember slip and adhesion. */
-void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
-{
-    tg_real rim, adhesion;
-    means(e, NULL, drive, &rim, &adhesion);
-    remember(e, rim, e->belief.x[e->settings.machine.wheels + 1], adhesion, dt);
-}
-
 /* Another dt without a ground speed: how likely it is the last slip still. */
 static tg_real go_unseen(tg_estimator *e, tg_real rim, tg_real dt)
 {
@@ -89,13 +85,58 @@ static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion,
     return rim * (1 - usual - keep * (last - usual));
 }
 
+/* Take the innovation of a ground speed, its variance, and the gain. */
+void tgi_watch_draw(tg_estimator *e, tg_real innovation, tg_real variance, tg_real gain)
+{
+    tgi_slip_memory *const m = &e->slip_memory;
+    const tg_real since = tgi_max(e->ground.interval, (tg_real)1e-3), leak = since / (TG_DRAWN + since), chance = tgi_square(gain) * variance / (2 * leak);
+    m->drawn += gain * innovation - leak * m->drawn;
+    const tg_real most = TG_BEYOND * tgi_max(m->draws, chance), square = tgi_square(m->drawn);
+    m->unusual = square > most;
+    m->draws += ((m->unusual ? most : square) - m->draws) / e->settings.tuned.alike_memory;
+}
+
+/* Whether every driven wheel's slip has surely another sign than its adhesion, of a row's estimates. */
+void tgi_watch_signs(tg_estimator *e, const tg_real *o)
+{
+    const tg_settings *const s = &e->settings;
+    const tg_real speed = tgi_square(o[TG_OUT_GROUND_SPEED_STD]) - e->scene.astray;
+    e->slip_memory.contrary = 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++) {
+        if (!s->driven[i]) continue;
+        const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], slip = o[TG_OUT_SLIP + i], mu = o[TG_OUT_ADHESION + i];
+        const tg_real apart = speed / tgi_square(tgi_max(tgi_fabs(rim), s->standstill_speed)) + tgi_square(s->uncertainty.wheel_radius);
+        if (!(slip * mu < 0 && tgi_square(slip) > TG_BEYOND * apart && tgi_square(mu) > TG_BEYOND * tgi_square(o[TG_OUT_ADHESION_STD + i]))) return;
+    }
+    e->slip_memory.contrary = 1;
+}
+
+/* After a row whose ground speed was measured: remember slip and adhesion. A receiver without a fix goes on by dead reckoning, smooth and
+ * wrong: what its speeds draw the estimate by then is no motion that the forces show, and the slip is not one of this adhesion. Until
+ * it is one again no slip is remembered and no curve learned, and what it differs by is a variance. */
+void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
+{
+    tgi_slip_memory *const m = &e->slip_memory;
+    const tg_real v = e->belief.x[e->settings.machine.wheels + 1];
+    tg_real rim, adhesion, variance;
+    means(e, NULL, drive, &rim, &adhesion);
+    const tg_real keep = m->astray ? go_unseen(e, rim, dt) : 1;
+    const tg_real off = tgi_square(v - reckoned_at(e, rim, adhesion, keep, tgi_square(e->settings.tuned.slip_spread) + tgi_square(m->slip / 4), &variance));
+    variance += e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
+    m->agreeing = off < variance && !m->contrary ? m->agreeing + dt : 0;
+    if (m->contrary || (m->unusual && off > TG_BEYOND * variance)) m->astray = 1;
+    else if (m->agreeing > TG_AGREED) m->astray = 0;
+    if (!m->astray) remember(e, rim, v, adhesion, dt);
+    e->scene.astray = m->astray ? off + variance : 0;
+}
+
 /* Whether the row's ground speed is to be reckoned, after so many seconds of silence; if it is measured, the silence is over. */
 static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_real silence)
 {
     e->scene.reckoned = 0;
     if (!isnan(row->value[TG_GROUND_SPEED])) {
         e->ground_time = row->time;
-        e->slip_memory.unseen = 0;
+        if (!e->slip_memory.astray) e->slip_memory.unseen = 0;
         return 0;
     }
     return (tg_real)(row->time - e->ground_time) >= silence && row->measured && dt > 0;
@@ -107,7 +148,9 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
 {
     const tg_tuned *const k = &e->settings.tuned;
     row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED];
+    if (e->standing) e->slip_memory.astray = e->scene.astray = 0;
     if (!is_missing(e, row, dt, k->silence)) return;
+    e->scene.astray = 0;
     if (e->standing && e->slope.running) tgi_slope_correct(&e->slope, 0, tgi_square(e->settings.standstill_speed) * (1 + 2 * k->alike / dt));
     if (!goes) return;
     tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, rim, adhesion, variance;

@@ -57,7 +57,12 @@ void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real
     drive->drift_by_slope = sensed ? 0 : drift_by_slope; /* a mounting is a constant, and considered */
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
-        if (s->running) tgi_slope_correct(s, speed, e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED]);
+        const tg_real noise = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED];
+        if (s->running) {
+            const tg_real innovation = speed - s->speed, variance = s->speed_variance + noise;
+            tgi_watch_draw(e, innovation, variance, s->speed_variance / variance);
+            tgi_slope_correct(s, speed, noise);
+        }
         else if (e->acceleration.seen) start(s, settings, speed);
     }
     drive->slope = pitch + s->error;

@@ -43,7 +43,7 @@ TG_INLINE tgi_common common_of(const tg_belief *b, const tg_real (*S)[TG_MAX_CON
     const int r = n, v = n + 1, columns = b->columns;
     const tg_real *const Pr = b->P + r * stride, *const Pv = b->P + v * stride;
     const tg_lanes by_r = products(S, r, r, 0, columns), by_v = products(S, r, v, 0, columns);
-    const tgi_common c = {tgi_max(Pv[v] + by_v[1], scene->reckoned) + scene->slow_speed + scene->disputed + scene->late, Pv[r] + by_v[0],
+    const tgi_common c = {tgi_max(Pv[v] + by_v[1], scene->reckoned) + scene->slow_speed + scene->disputed + scene->late + scene->astray, Pv[r] + by_v[0],
                           Pr[r] + by_r[0] + (scene->bumps + scene->unseen_grade)};
     return c;
 }

@@ -232,3 +232,31 @@ def test_a_sensor_lost_while_driving_does_not_drive_a_vehicle_that_stands(
         error, spread = np.abs(estimates[name][stands]), estimates[f"{name}_std"][stands]
         assert np.max(error) * (1.0 if name == "ground_speed" else RADIUS) < 0.1, name
         assert np.mean(error < 1.96 * spread) > 0.92, name
+
+
+def dead_reckoned(made: Drive, seed: int = 0) -> Drive:
+    """From LOST to BACK the receiver has no fix: it shows its last mean, a walk of .1 m/s in 40 s, and a seventh of what happens."""
+    time, speed = made.recording.time, made.recording["ground_speed"].copy()
+    rows = (time > LOST) & (time < BACK)
+    usual = np.mean(made.truth["ground_speed"][(time > LOST - 3) & (time <= LOST)])
+    walk = (
+        np.cumsum(np.random.default_rng(seed).standard_normal(rows.sum()))
+        * 0.016
+        * np.sqrt(time[1] - time[0])
+    )
+    speed[rows] = usual + walk + 0.15 * (made.truth["ground_speed"][rows] - usual)
+    return replace(
+        made,
+        recording=replace(made.recording, channels=dict(made.recording.channels) | {"ground_speed": speed}),
+    )
+
+
+@pytest.mark.parametrize("imu", [True, False])
+def test_a_receiver_that_reckons_without_saying_so_is_not_believed(imu: bool) -> None:
+    """Its slips, .3 beside the truth in the mean, were held in 3 % of rows."""
+    made = drive(160.0, rate=50.0, imu=imu, slip=soils, speed=lambda t: 0.8 + 0.4 * np.sin(t / 3))
+    time, right = made.recording.time, estimate(made.recording, robot())
+    wrong = estimate(dead_reckoned(made).recording, robot())
+    assert held(wrong, made, (time > LOST + 5) & (time < BACK), "slip_fl") > 0.75
+    fixed = (time < LOST) | (time > BACK + 10)
+    assert np.median(wrong["slip_fl_std"][fixed]) < 1.1 * np.median(right["slip_fl_std"][fixed])

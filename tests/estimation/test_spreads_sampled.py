@@ -27,11 +27,11 @@ def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, 
     engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
     time, columns = prepared(estimator, recording)
     last = engine.record(time, columns)[-1].copy()
-    assert len(last) > lib.tg_record_length(4, COLUMNS) > len(last) - 79  # the row's scene follows
+    assert len(last) > lib.tg_record_length(4, COLUMNS) > len(last) - 80  # the row's scene follows
     x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
     pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
     assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK
-    return x, P, s, float(np.sqrt(last[-5])), float(np.sqrt(last[-4:-1].sum()))
+    return x, P, s, float(np.sqrt(last[-6])), float(np.sqrt(last[-5:-1].sum()))
 
 
 @pytest.mark.parametrize("slip", [0.013, 0.016, 0.019, 0.03, 0.12, 0.35])  # the first ones pull about nothing
