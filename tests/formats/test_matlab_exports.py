@@ -251,3 +251,36 @@ def structs(parts: list[dict[str, Any]]) -> np.ndarray:
         for name, value in part.items():
             result[0, k][name] = value
     return result
+
+
+@pytest.mark.parametrize("names", ["varNames", "headers"])
+def test_a_cell_of_names_names_the_columns_of_a_matrix_and_one_of_units_their_units(
+    tmp_path: Path, names: str
+) -> None:
+    """data[1], data[2]: 'nothing that Terragrip knows', though names and units stood beside them."""
+    content = {
+        "M": np.c_[TIME, 3.6 * SPEED, 10 * SPEED],
+        names: np.array(["time", "vGround", "omega_RL"], dtype=object),
+        "varUnits": np.array(["s", "km/h", "rad/s"], dtype=object),
+    }
+    scipy.io.savemat(tmp_path / "log.mat", content)
+    found = inspect(tmp_path / "log.mat").proposals
+    assert found["ground_speed"].entry == {"from": "vGround", "unit": "km/h"}
+    assert found["wheel_speed_rl"].columns == ("omega_RL",)
+
+
+def test_wheels_names_name_the_columns_of_several_matrices_either_way_round(tmp_path: Path) -> None:
+    wheels = np.array(["FL", "FR", "RL", "RR"], dtype=object)
+    speeds = np.column_stack([SPEED + k for k in range(4)])
+    content = {"t": TIME, "v_x": SPEED, "omega": speeds, "torque": 9 * speeds.T, "wheels": wheels}
+    scipy.io.savemat(tmp_path / "log.mat", content)
+    found = inspect(tmp_path / "log.mat").recognised
+    assert found["wheel_speed_fr"] == ("omega_FR",)
+    assert found["drive_torque_rl"] == ("torque_RL",)
+
+
+def test_a_label_for_each_instant_names_no_columns(tmp_path: Path) -> None:
+    content = {"t": TIME, "omega": np.c_[SPEED, SPEED + 1], "soil": np.array(["clay"] * COUNT, dtype=object)}
+    scipy.io.savemat(tmp_path / "log.mat", content)
+    table = read_table(tmp_path / "log.mat")
+    assert {"omega[0]", "omega[1]", "soil"} <= set(table.columns)

@@ -117,3 +117,14 @@ def test_where_it_brakes_as_much_as_it_pulls_no_torque_says_which_side_counts_ba
     for wheel in ("fl", "fr", "rl", "rr"):
         assert "sign" not in proposals[f"drive_torque_{wheel}"].entry
         assert "one falls where the other rises" in proposals[f"drive_torque_{wheel}"].doubt
+
+
+def test_torques_that_the_pull_leaves_nothing_of_are_in_doubt_with_it(tmp_path: Path) -> None:
+    """Currents that a driver calls efforts were torques in N m, without a question mark."""
+    right = drive()
+    found = inspected(tmp_path, {n: v / 5 if n in TORQUES else v for n, v in right.items()}, known=True)
+    for channel in ("drive_torque_fl", "drive_torque_rr", "drawbar_force"):
+        assert found.proposals[channel].doubt.endswith("the units of both?")
+    assert not any(
+        "the units of both" in p.doubt for p in inspected(tmp_path, right, known=True).proposals.values()
+    )

@@ -210,3 +210,28 @@ def test_an_autopilots_log_is_refused_with_what_makes_a_table_of_it(tmp_path: Pa
         InputError, match=r"is an ArduPilot log; make a CSV table by pymavlink: mavlogdump\.py"
     ):
         read(path)
+
+
+@pytest.mark.parametrize(("of_wheels", "channel"), [(True, "wheel_based_speed"), (False, "ground_speed")])
+def test_odometry_is_the_wheels_where_it_follows_from_them(of_wheels: bool, channel: str) -> None:
+    """A camera's odometry of an unknown name was the wheels' own speed, without a question mark."""
+    rims = {
+        f"/joint_states.velocity.{side}_wheel": rim / (0.9 + 0.08 * np.sin(TIME / 5))
+        for side, rim in RIMS.items()
+    }
+    speed = RADIUS * np.mean(list(rims.values()), axis=0) if of_wheels else SPEED
+    result = _propose({**rims, "/zed/odom.twist.twist.linear.x": speed})
+    assert result[channel].columns == ("/zed/odom.twist.twist.linear.x",)
+    assert (result[channel].doubt == "") == of_wheels
+    assert len({"wheel_based_speed", "ground_speed"} & result.keys()) == 1
+
+
+def test_both_velocities_of_a_message_that_are_great_are_over_ground() -> None:
+    """Its x alone, which is the speed to the east, was proposed."""
+    way = 0.3 + TIME / 15
+    columns = {f"/fix_velocity.twist.linear.{a}": SPEED * f(way) for a, f in (("x", np.cos), ("y", np.sin))}
+    found = _propose(columns)["ground_speed"]
+    assert found.entry == {"norm_of": list(columns)}
+    assert found.doubt
+    along = {name: SPEED if name.endswith("x") else 0.01 * SPEED for name in columns}
+    assert _propose(along)["ground_speed"].columns == ("/fix_velocity.twist.linear.x",)

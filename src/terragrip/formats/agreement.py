@@ -18,6 +18,7 @@ from terragrip.vehicle import Vehicle
 
 _KNOWN = ("Terragrip", "a signal")
 _E7 = re.compile(r"(?:^|[\W_\d]|lat|lon|lng|itude|deg)e-?7\W*$", re.IGNORECASE)
+_NOT_OF_WHEELS = 0.03  # of the speed: more than stamps and rounding leave of wheel odometry
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
 
 
@@ -45,8 +46,27 @@ class Agreement:
             self._turns_of_body(ranked),
             self._ground(ranked, assumed=True),
         )
+        self._odometry(ranked)
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
+
+    def _odometry(self, ranked: Ranked) -> None:
+        """Odometry that does not follow from the wheel speeds may be a camera's, or fused: then it is over ground, with a doubt."""
+        rims = [
+            best.column.column for c in ranked if c.startswith("wheel_speed_") and (best := surest(ranked, c))
+        ]
+        for guess in list(ranked.get("wheel_based_speed", ())):
+            if len(rims) < 2 or not guess.column.name.has("odometry") or guess.column.name.has("wheel"):
+                continue
+            rest = self._evidence.beyond(guess.column.column, rims)
+            if rest is not None and rest > _NOT_OF_WHEELS:
+                doubt = (
+                    f"odometry that differs by {rest:.0%} from what the wheel speeds make of it: a camera's?"
+                )
+                ranked["wheel_based_speed"].remove(guess)
+                ranked.setdefault("ground_speed", []).append(
+                    replace(guess, channel="ground_speed", confidence=0.4, doubt=doubt)
+                )
 
     def _positions(self, ranked: Ranked) -> None:
         """Latitudes and longitudes in radians or degrees: both have one unit."""

@@ -5,7 +5,7 @@ Every check gives a `Finding`: a sentence, and where it can tell the unit, that.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -109,6 +109,18 @@ class Evidence:
         )
         result[off] = np.nan
         return result
+
+    def beyond(self, name: str, others: Sequence[str]) -> float | None:
+        """What a column differs by from the sum of ``others``, each times a number, relative to its size; None where too little moves."""
+        if (out := self.series(name)) is None:
+            return None
+        made = np.array([self.at(other, out[0]) for other in others]).T
+        known = np.isfinite(made).all(axis=1)
+        values, made = out[1][known], made[known]
+        if len(values) < 20 * len(others) or not np.ptp(values):
+            return None
+        rest = values - made @ np.linalg.lstsq(made, values, rcond=None)[0]
+        return float(np.sqrt(np.mean(rest**2) / np.mean(values**2)))
 
     def size(self, name: str) -> float:
         """The 95 % quantile of the absolute values; 0 where there is none."""

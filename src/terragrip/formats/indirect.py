@@ -22,6 +22,7 @@ from terragrip.vehicle import Vehicle
 _COUNT = frozenset(
     ["tick", "ticks", "count", "counts", "cnt", "counter", "pulse", "pulses", "encoder", "encoders", "enc"]
 )
+_TWIST = re.compile(r"[./]twist[./]linear[./]x$")
 _ONE_WAY = 0.7
 """Least share of a count's steps in one direction, where no ground speed shows that it counts on."""
 _NO_COUNT = ("command", "other", "statistic", "rate", "speed", "ground", "acceleration")
@@ -118,6 +119,7 @@ def _derived_speed(
         entry: dict[str, object] = {"norm_of": list(parts)}
         entry |= {"unit": unit} if unit and unit != "m/s" else {}
         doubt = "" if unit else "no unit is stated: m/s?"
+        doubt = doubt if columns[parts[0]].name.has("ground", "east", "north") else "over ground?"
         return Proposal(entry, doubt, "", 0.8, ("two velocities in the plane",), (), unit)
     if pair := _position_pair(numbers, columns):
         forward = {"quaternion": pose} if pose else _yaw(numbers, columns)
@@ -153,12 +155,13 @@ def _east_and_north(columns: Mapping[str, Column]) -> tuple[str, str] | None:
 
 
 def velocity_in_the_plane(columns: Mapping[str, Column], evidence: Evidence) -> tuple[str, str] | tuple[()]:
-    """A receiver's velocities x and y, of which neither is along the vehicle: both are great."""
+    """The velocities x and y of a receiver, or of one ROS message, of which neither is along the vehicle: both are great."""
     for name, column in columns.items():
         read = column.name
-        if read.axis != "x" or not (read.has("ground") and read.has("speed")):
+        of_message = _TWIST.search(name) is not None and not read.has("odometry", "wheel")
+        if read.axis != "x" or not ((read.has("ground") and read.has("speed")) or of_message):
             continue
-        if read.has("statistic", "command", "position", "rate", "gyro"):
+        if read.has("command", "position", "rate", "gyro") or (read.has("statistic") and not of_message):
             continue
         for other, beside in columns.items():
             if beside.name.axis == "y" and beside.name.words == (*read.words[:-1], "y"):

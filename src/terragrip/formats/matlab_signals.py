@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.matlab_values import Array, Opaque, read_array, texts_of
+from terragrip.recording.columns import DATENUM_1970, DAY
 from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import LABELS, is_own
 from terragrip.units import UnitError, factor_to, is_common
@@ -33,7 +34,6 @@ _WIDEST = 256  # columns of a matrix that are signals: a logger's channels, no i
 _SHORTEST = 20  # rows of a matrix with its time in it: lookup tables are shorter
 _DEEPEST = 12
 _DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
-_DATENUM_1970 = 719_529.0
 
 
 @dataclass
@@ -118,25 +118,46 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
 
 
 def _with_named_columns(struct: Mapping[str, Any], contents: Contents) -> Mapping[str, Any]:
-    """A struct with the columns of its ``data`` by their ``colheaders``, as importdata makes both; any other as it is."""
-    data, heads = _value(struct, ("data",)), texts_of(_value(struct, ("colheaders",)))
-    if heads is None or not _is_numeric(data) or data.shape[1:] != heads.shape:
+    """A struct with the columns of its matrices by the texts beside them, of which there are as many: ``data`` and ``colheaders``, as
+    importdata makes both, or any cell of names; of several matrices ``omega_fl``. A second cell, of units, gives theirs."""
+    wide = {
+        key: part
+        for key, part in struct.items()
+        if _is_numeric(part) and len(part.shape) == 2 and 1 < min(part.shape) < max(part.shape)
+    }
+    lists = {
+        key: texts
+        for key, part in struct.items()
+        if key.lower() != "textdata"
+        and (texts := texts_of(part)) is not None
+        and any(len(texts) == min(matrix.shape) for matrix in wide.values())
+    }
+    stated = next((key for key, texts in lists.items() if all(map(is_common, filter(None, texts)))), "")
+    named = next((key for key in lists if key != stated), "")
+    if not named:
         return struct
-    names, units = names_and_units(heads.tolist())
-    table = read_array(data)
-    twice = dict.fromkeys(name for name in names if names.count(name) > 1)
+    heads, units = names_and_units(lists[named].tolist())
+    if stated and len(lists[stated]) == len(heads):
+        units |= dict(zip(heads, lists[stated], strict=True))
+    twice = dict.fromkeys(head for head in heads if heads.count(head) > 1)
     if twice:  # as of a CSV
         contents.notes.append(
             f"Columns that occur twice are left out: {', '.join(twice)}. Rename one to use it."
         )
-    rest = {
-        key: part for key, part in struct.items() if key.lower() not in ("data", "colheaders", "textdata")
-    }
-    return {
-        **rest,
-        **{name: table[:, k] for k, name in enumerate(names) if name not in twice},
-        "units": units,
-    }
+    own = {key: part for key, part in wide.items() if min(part.shape) == len(heads)}
+    columns: dict[str, Any] = {}
+    stated_units: dict[str, str] = {}
+    for key, part in own.items():
+        table = read_array(oriented(part, max(part.shape)))
+        for k, head in enumerate(heads):
+            name = head if len(own) == 1 else f"{key}_{head}"
+            if head not in twice:
+                columns[name] = table[:, k]
+                stated_units |= {name: units[head]} if head in units else {}
+    used = {*own, named, stated}
+    rest = {key: part for key, part in struct.items() if key not in used and key.lower() != "textdata"}
+    around = _value(struct, _UNITS)
+    return {**rest, **columns, "units": {**(around if isinstance(around, Mapping) else {}), **stated_units}}
 
 
 def _clocks(struct: Mapping[str, Any], name: str, contents: Contents, above: Around) -> dict[int, Any]:
@@ -362,6 +383,6 @@ def seconds_of(clock: npt.NDArray[Any], scale: float) -> npt.NDArray[np.float64]
     """A time vector in seconds; days since year 0, as datenum gives them, count from 1970 then."""
     time = np.asarray(clock, dtype=np.float64)
     if len(time) and _DATENUM[0] < time[0] < _DATENUM[1] and np.median(np.abs(np.diff(time[:1000]))) < 0.01:
-        return (time - _DATENUM_1970) * 86400.0
+        return (time - DATENUM_1970) * DAY
     with np.errstate(invalid="ignore"):  # a damaged file may hold signalling NaNs
         return np.asarray(time * scale)

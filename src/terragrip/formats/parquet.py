@@ -13,7 +13,7 @@ from terragrip.files import refuse_missing
 from terragrip.formats.registry import Format
 from terragrip.formats.table import from_arrow
 from terragrip.formats.table_on_disk import Columns, TableOnDisk
-from terragrip.recording.frames import names_and_units, units_of_fields
+from terragrip.recording.frames import names_and_units, of_levels, units_of_fields
 from terragrip.recording.schema import TIME
 from terragrip.recording.survey import ROWS
 
@@ -36,7 +36,7 @@ def parquet_on_disk(path: str) -> TableOnDisk:
         whole = [str(field.name) for field in fields]
         stated = units_of_fields(file.schema_arrow)
         count = int(file.metadata.num_rows)
-        named, behind = names_and_units([_of_levels(name) for name in whole])
+        named, behind = names_and_units([_joined(name) for name in whole])
         spelt = dict(zip(named, whole, strict=True))
         units = {name: unit for name in named if (unit := behind.get(name) or stated.get(spelt[name]))}
         unreadable = tuple(name for name, field in zip(named, fields, strict=True) if not _is_readable(field))
@@ -63,7 +63,7 @@ def parquet_on_disk(path: str) -> TableOnDisk:
     return TableOnDisk(names, units, path, count, blocks, is_long=is_long, unreadable=unreadable, twice=twice)
 
 
-def _of_levels(name: str) -> str:
+def _joined(name: str) -> str:
     """The name of a column of several levels, which pandas writes as a tuple, in one: ``wheel_speed_fl``."""
     if not re.fullmatch(r"\((['\"]).*\1\)", name):
         return name
@@ -71,7 +71,7 @@ def _of_levels(name: str) -> str:
         levels = ast.literal_eval(name)
     except (ValueError, SyntaxError):
         return name
-    return "_".join(str(level) for level in levels if level != "")
+    return of_levels(levels)
 
 
 def _index_columns(schema: pa.Schema) -> list[str]:

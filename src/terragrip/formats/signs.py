@@ -15,6 +15,7 @@ from terragrip.vehicle import Vehicle
 
 _FAST = 0.3  # of what a twentieth of the drive exceeds
 _MOSTLY = 0.75  # of such rows
+_WHICH = ": 'sign: -1', for it or for that one?"
 _FORCES = ("drive_torque_", "drawbar_force")
 
 
@@ -36,7 +37,7 @@ def add_signs(proposals: Proposals, recording: Recording, vehicle: Vehicle | Non
             proposals[channel] = (
                 _turned(proposals[channel], note.shown)
                 if note.sure
-                else _doubted(proposals[channel], f"{note.shown}: 'sign: -1', for it or for that one?")
+                else _doubted(proposals[channel], note.shown + _WHICH * (not note.shown.endswith("?")))
             )
         turned |= named.keys()
         if not named:

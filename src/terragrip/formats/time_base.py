@@ -11,6 +11,7 @@ from terragrip.arrays import Floats
 from terragrip.formats.profile_parts import TimeSource
 from terragrip.formats.table import LogTable
 from terragrip.recording.columns import (
+    DATENUM_1970,
     DAY,
     SINCE_1970,
     SPREADSHEET_1970,
@@ -54,5 +55,7 @@ def _since_1970(stamps: npt.NDArray[Any], origin: TimeSource) -> float | None:
     first = float(stamps[0]) * unit if len(stamps) else np.nan
     if not SINCE_1970 < first < np.inf:
         return None
-    before = SPREADSHEET_1970 * unit if unit == DAY else 0.0
+    before = (
+        (SPREADSHEET_1970 if first < DATENUM_1970 * unit else DATENUM_1970) * unit if unit == DAY else 0.0
+    )
     return (first if origin.zero == "first" else 0.0) - before

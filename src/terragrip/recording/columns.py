@@ -44,6 +44,8 @@ SINCE_1970 = 1e8
 DAY = 86400.0  # s
 SPREADSHEET_1970 = 25569
 """Days of a spreadsheet's dates, which count from 1899-12-30, until 1970."""
+DATENUM_1970 = 719529
+"""Days of MATLAB's datenum, which counts from the year 0, until 1970."""
 
 
 def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:

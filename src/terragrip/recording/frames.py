@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,8 +136,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
         pairs = _variables(frame)
     elif not lazy and hasattr(getattr(frame, "columns", None), "nlevels"):  # pandas, GeoPandas
         if frame.columns.nlevels > 1:
-            hint = f"choose one, frame[{frame.columns[0][0]!r}], or write each name in one"
-            raise InputError("has names of several levels", file=source, hint=hint)
+            frame = frame.set_axis([of_levels(levels) for levels in frame.columns], axis=1)
         index = frame.index
         if TIME not in frame.columns and index.nlevels == 1 and index.dtype.kind in "mM":
             if index.name not in (None, TIME, *frame.columns):  # a profile may name it as it is called
@@ -170,6 +169,11 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
             raise InputError(problem, file=source, place=f"column {name}", hint="give columns of one length")
         columns[name] = column
     return columns
+
+
+def of_levels(levels: Iterable[Any]) -> str:
+    """The name of a column of several levels in one: ``wheel_speed_fl`` of ``("wheel_speed", "fl")``."""
+    return "_".join(str(level) for level in levels if level != "")
 
 
 def names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:

@@ -49,10 +49,13 @@ def pull_warnings(means: Means, recording: Recording, vehicle: Vehicle) -> list[
         )
         return [WrongSign(sentence, names, shown)]
     if rest < -PULL:
-        return [
+        shown = f"torques over the radius of {thrust:.2g} of the weight and a pull of {pulled:.2g}: the units of both?"
+        sentence = (
             f"The drive torques over the wheel radius are {thrust:.2g} of the weight on average and the drawbar force {pulled:.2g}, "
             "which leaves nothing to drive the vehicle: check the units of both, and that each wheel has its torque."
-        ]
+        )
+        names = ["drawbar_force", *(f"drive_torque_{wheel}" for wheel in vehicle.driven_radii)]
+        return [WrongSign(sentence, names, shown, sure=False)]
     cell = recording.channels["drawbar_force"] / vehicle.mass / STANDARD_GRAVITY
     if 0 < quantile(np.abs(cell[np.isfinite(cell)]), 0.95) < _NO_PULL:  # one without a tool shows its noise
         return [

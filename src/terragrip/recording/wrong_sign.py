@@ -15,7 +15,7 @@ class WrongSign(str):
     sure: bool
 
     def __new__(cls, sentence: str, channels: Iterable[str], shown: str, *, sure: bool = True) -> Self:
-        """Not ``sure``: another channel's sign, or another motion, would explain it as well."""
+        """Not ``sure``: another channel's sign, its unit or another motion would explain it as well."""
         result = super().__new__(cls, sentence)
         result.channels, result.shown, result.sure = tuple(channels), shown, sure
         return result
