@@ -152,7 +152,8 @@ struct tg_estimator {
     tg_hold forward;           /* acceleration */
     int32_t sparse_wheels;
     int32_t rolls;             /* bits: a free wheel whose speed was never measured, which goes as its hub does */
-    int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c */
+    int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c, */
+    int32_t locked[8];         /* and its speed */
     int32_t unseen;            /* since a gap: bit 0 no wheel speed, bit 1 no ground speed was measured */
     int32_t braked;            /* a brake turns the wheels, by an unknown torque */
     int32_t pressed;           /* its last sample, */

@@ -35,7 +35,8 @@ def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """Sentences on torques of several wheels that are one signal, and on speeds of both sides of an axle that are."""
     notes = [
         f"{', '.join(group)} are one signal: how wheels share it was not measured, so only their mean adhesion is. Single wheels' "
-        "intervals hold an open differential's friction, no lock. If it is the sum of their torques, divide it ('scale:' in the profile)."
+        "intervals hold an open differential's friction, a lock only where their speed is one signal, too. If it is the sum of their "
+        "torques, divide it ('scale:' in the profile)."
         for group in one_signal(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
     turns, pairs = _turns(recording, vehicle), []
