@@ -169,6 +169,13 @@ def test_time_in_minutes_hours_or_days_is_named_alone(
     assert f"unit: {unit}}}" in note
 
 
+def test_speeds_in_thousandths_are_no_clock_in_minutes() -> None:
+    """850 m/s: 'give the unit of time, min'."""
+    notes = notes_on({n: v * (1e3 if "speed" in n else 1.0) for n, v in drive().items()})
+    assert any("they reach" in note and "'ground_speed: {from: ..., unit: mm/s}'" in note for note in notes)
+    assert not any("time may not be" in note for note in notes)
+
+
 def test_a_drive_of_two_starts_tells_of_its_clock() -> None:
     """Of 300 s it changes its speed in 4: of 192 simulated drives in minutes, 51 were left alone."""
     columns = drive()

@@ -51,22 +51,15 @@ class Agreement:
             del ranked[channel]
 
     def _odometry(self, ranked: Ranked) -> None:
-        """Odometry that does not follow from the wheel speeds may be a camera's, or fused: then it is over ground, with a doubt."""
-        rims = [
-            best.column.column for c in ranked if c.startswith("wheel_speed_") and (best := surest(ranked, c))
-        ]
-        for guess in list(ranked.get("wheel_based_speed", ())):
+        """Odometry that does not follow from the wheel speeds may be smoothed, fused or a camera's: a doubt."""
+        rims = [g.column.column for c in ranked if c.startswith("wheel_speed_") and (g := surest(ranked, c))]
+        for k, guess in enumerate(ranked.get("wheel_based_speed", ())):
             if len(rims) < 2 or not guess.column.name.has("odometry") or guess.column.name.has("wheel"):
                 continue
             rest = self._evidence.beyond(guess.column.column, rims)
             if rest is not None and rest > _NOT_OF_WHEELS:
-                doubt = (
-                    f"odometry that differs by {rest:.0%} from what the wheel speeds make of it: a camera's?"
-                )
-                ranked["wheel_based_speed"].remove(guess)
-                ranked.setdefault("ground_speed", []).append(
-                    replace(guess, channel="ground_speed", confidence=0.4, doubt=doubt)
-                )
+                doubt = f"differs by {rest:.0%} from what the wheel speeds make of it: if a camera's or a lidar's, it is ground_speed?"
+                ranked["wheel_based_speed"][k] = replace(guess, confidence=0.4, doubt=doubt)
 
     def _positions(self, ranked: Ranked) -> None:
         """Latitudes and longitudes in radians or degrees: both have one unit."""

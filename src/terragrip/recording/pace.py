@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from terragrip.vehicle import Vehicle
 
 GRIP = 15.0  # m/s²: no tyre or track on the ground gives as much
+_FASTEST = 150.0  # m/s: no vehicle on ground, as in proposals
 _LAGS = (4, 16, 64)  # rows over which a speed changes
 _OFTEN = 0.99  # of the changes are slower (right logs: by 2.5 m/s² at most, comma2k19's car among them)
 _ENOUGH = 4000  # rows that are examined
@@ -47,8 +48,14 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     time, speed = recording.time, filled(recording.time, ground)
     changes = _changes(time, speed, rims)
     if changes > GRIP:
+        fastest = quantile(np.abs(speed[np.isfinite(speed)]), _OFTEN)
+        cause = (
+            f"they reach {fastest:.3g} m/s: give the units of both in a profile, as 'ground_speed: {{from: ..., unit: mm/s}}'"
+            if fastest > _FASTEST
+            else _clock(changes / GRIP, time)
+        )
         return [
-            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {_clock(changes / GRIP, time)}."
+            f"ground and wheels change their speed by {changes:.3g} m/s², more than any ground allows: {cause}."
         ]
     rows = _longest_stretch(time)  # while the logger was off, a machine may be carried away
     some = rows[:: max(1, len(rows) // _ENOUGH)]
