@@ -114,10 +114,12 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     const tg_real command = tgi_max(rim + (gain < 0 ? gain : 0), -rim / 2) / s->command;
     const tg_real high = s->high_slip > 0 ? (slip - s->high_slip) / one_point(s->high_slip / s->most, deviation) : 0;
     const tg_real leading = d->usual[1] - now[TGI_BALANCE], resistance = now[TGI_RESISTANCE] - mean[TGI_RESISTANCE];
+    /* No rise is surer than what it rises from: at first that is a guess. */
+    const tg_real unsure = tgi_max(now[TGI_RESISTANCE_DEVIATION], mean[TGI_RESISTANCE_DEVIATION]);
     d->points[TG_SIGN_RISE] = bounded(rise / one_point(s->change, deviation), -s->most, s->most);
     d->points[TG_SIGN_HIGH] = bounded(high, 0, 2 * s->most);
     d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->change, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
-    d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, now[TGI_RESISTANCE_DEVIATION]), -s->most, s->most);
+    d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, unsure), -s->most, s->most);
     d->points[TG_SIGN_COMMAND] = -bounded(command, 0, 2 * s->most);
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];

@@ -90,11 +90,9 @@ static tgi_view view_of(const tg_estimator *e, const tg_row *row, int32_t measur
     l.leading = ahead > 0 && behind > 0 ? l.leading / ahead : adhesion / count;
     l.trailing = ahead > 0 && behind > 0 ? l.trailing / behind : adhesion / count;
     l.adhesion_deviation = tgi_sqrt(2 * l.adhesion_deviation) / count;
-    /* Hills are slow; what soil does within metres is no error of its resistance, but no digging either. */
-    /* A pull that no cell measures counts as one that stays: it is in no rise. */
-    const tg_real pull = s->towing ? 0 : s->uncertainty.drawbar_offset * e->filter.inverse_mass / s->machine.gravity;
-    const tg_real known = tgi_square(o[TG_OUT_SOIL_RESISTANCE_STD]) - tgi_square(pull) - e->scene.unseen_grade - e->scene.bumps;
-    l.resistance_deviation = tgi_sqrt(tgi_max(known, 0) + e->roughness.wander);
+    /* Of a rise: what lasts (gains, a pull, hills) is in none, and a filter's lag shows less of it. What soil does within metres is no
+     * error of its resistance, but no digging either. */
+    l.resistance_deviation = tgi_sqrt(TG_NOISE_SHARE * e->belief.P[s->machine.wheels * (tgi_stride(s->machine.wheels) + 1)] + e->roughness.wander);
     l.resistance = o[TG_OUT_SOIL_RESISTANCE];
     if (e->settings.method == TG_SPEEDS) l.leading = l.trailing = l.adhesion_deviation = 0; /* no torque, no adhesion: slip and speeds speak alone */
     l.travel = (tg_real)e->direction * o[TG_OUT_GROUND_SPEED];

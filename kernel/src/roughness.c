@@ -5,7 +5,6 @@
  * which no pitch sensor reads, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
 #include "estimator.h"
 
-#define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */
 #define TG_SMALL_ADHESION ((tg_real)1e-4)    /* .01 squared: below it scatter is not relative */
 #define TG_SMALL_RESISTANCE ((tg_real)1.6e-5) /* .004 squared */
 

@@ -11,7 +11,7 @@ static tg_watch_settings default_watch(void)
     w.soon = 6;
     w.ahead = (tg_real)0.18;
     w.beyond = 2;
-    w.warn = (tg_real)3.6;
+    w.warn = (tg_real)3.8;
     w.most = 3;
     w.change = (tg_real)0.04;
     w.command = (tg_real)0.03;
