@@ -148,7 +148,7 @@ def test_five_metres_without_pull_are_needed(vehicle: Vehicle, free: int, known:
     result = radii.rolling_radii(rolled(vehicle, free), vehicle, np.arange(90) // 6, ["log"])
     assert isinstance(result, radii.Rolling) is known
     if not known:
-        assert result.why == "4 m of straight steady passes at zero pull, and 5 m are needed"
+        assert result.why == "4 m of straight passes at zero pull, and 5 m are needed"
 
 
 def balance(n: int = 200, seed: int = 1, **more: Any) -> torque_scale._Balance:

@@ -114,13 +114,6 @@ def test_passes_are_forward_and_faster_than_a_fifth_of_a_metre_a_second(
     assert len(passes(table(1), vehicle)) == 1
 
 
-@pytest.mark.parametrize(("rate", "counts"), [(0.49, True), (0.5, False)])
-def test_passes_are_steady_to_a_twentieth_of_gravity(vehicle: Vehicle, rate: float, counts: bool) -> None:
-    for length in (1.0, 2.0):
-        windows = table(length=length, ground_speed=1.0 + rate * length * np.arange(N))
-        assert passes(windows, vehicle).all() == counts
-
-
 @pytest.mark.parametrize(("apart", "counts"), [(0.33, True), (0.34, False)])
 def test_where_the_turn_is_known_a_pass_may_bend(vehicle: Vehicle, apart: float, counts: bool) -> None:
     """Hubs may be .3 of the rims' mean speed apart, however far the rims are."""

@@ -309,7 +309,7 @@ def _radii(
     if gains is not None and not determined:
         differences = (np.ones(wheels), np.hypot(gains.radius - 1, gains.radius_std))
     sentence = (
-        "ground speed over wheel speed on straight steady passes at zero pull, corrected for the slip of "
+        "ground speed over wheel speed on straight passes at zero pull, corrected for the slip of "
         f"{100 * rolling.slip:.2f} % there"
     )
     if gains is not None and determined:
