@@ -344,7 +344,6 @@ typedef struct {
     tg_real uneven_length;          /* wheel radii: shorter changes of adhesion and resistance are the ground's unevenness */
     tg_real uneven_memory;          /* wheel radii over which their mean squares are averaged */
     tg_real uneven_most;            /* usual squares that one counts at most: a border between soils is no bump */
-    tg_real least_load_spread;      /* relative SD of the load that no log can show, since all wheels share it */
     tg_real slip_length;            /* wheel radii over which a wheel's slip beyond all trends is averaged, or low-passed as strongly */
     tg_real bend, bend_spread;      /* slope of the curve that wheels share over its secant, and what it may be at most */
     tg_real least_slip;             /* below it the secant of that curve is not known */

@@ -36,7 +36,7 @@ static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stret
     tgi_hidden *h = &e->hidden;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real slope = k->bend * tgi_max(h->pulling, 0) / tgi_max(h->slipping, k->least_slip);
-    const tg_real alike = tgi_exp(-tgi_square(away / TG_LOAD_LENGTH) / 2), shown = e->roughness.scatter + tgi_square(k->least_load_spread) * e->roughness.square;
+    const tg_real alike = tgi_exp(-tgi_square(away / TG_LOAD_LENGTH) / 2), shown = e->roughness.scatter;
     tg_real here[TG_MAX_WHEELS], there[TG_MAX_WHEELS];
     if (!(shown > 0)) return;
     for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {

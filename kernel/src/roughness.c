@@ -84,10 +84,9 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
             r->waited = 0;
         }
     }
-    const tg_real least = tgi_square(k->least_load_spread) * square + TG_SMALL_ADHESION;
-    count_square(&r->scatter, apart(change, driven), least, k->uneven_most, gain);
+    count_square(&r->scatter, apart(change, driven), TG_SMALL_ADHESION, k->uneven_most, gain);
     r->square += gain * (square - r->square);
-    count_square(&r->own, own, least, k->uneven_most, gain);
+    count_square(&r->own, own, TG_SMALL_ADHESION, k->uneven_most, gain);
     watch_hills(e, rho, travelled);
     if (!flowing) r->resistance = r->mean_resistance = rho;
     r->resistance += fresh * (rho - r->resistance);
@@ -112,9 +111,8 @@ tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e
  * length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
-    const tg_tuned *k = &e->settings.tuned;
-    const tg_real whole = 1 + TG_LOAD_LENGTH / k->uneven_length, scatter = tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0);
-    return whole * tgi_relative(e, tgi_by_load(e, scatter)) + tgi_square(k->least_load_spread);
+    const tg_real whole = 1 + TG_LOAD_LENGTH / e->settings.tuned.uneven_length, scatter = tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0);
+    return whole * tgi_relative(e, tgi_by_load(e, scatter));
 }
 
 /* Variance of the slope that rho_s may contain where nothing measures the slope: hills and soft soil both need thrust. The variation of

@@ -66,7 +66,6 @@ static tg_tuned default_tuned(void)
     k.uneven_length = 4;
     k.uneven_memory = 40;
     k.uneven_most = 4;
-    k.least_load_spread = (tg_real)0.02;
     k.slip_length = (tg_real)0.25;
     k.bend = (tg_real)0.5;
     k.bend_spread = (tg_real)0.9;

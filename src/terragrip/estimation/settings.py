@@ -47,7 +47,6 @@ class Thresholds:
             self.together > 1
         ):  # bumps come and go under single wheels; what all do together is the pull, not a load unseen
             settings.tuned.uneven_memory = 1e9
-            settings.tuned.least_load_spread /= math.sqrt(self.together)
 
 
 WITHOUT_TORQUE = 2 / 3
