@@ -190,13 +190,12 @@ def test_a_resistance_for_each_stretch_is_as_a_term_for_each() -> None:
 
 def test_the_scale_is_that_of_two_instruments() -> None:
     rows, weight = balance(), np.random.default_rng(2).uniform(0.2, 1.0, 200)
-    scale, strength, rest = torque_scale._slope(rows, weight)
+    scale, rest = torque_scale._slope(rows, weight)
 
     def centered(x: np.ndarray) -> np.ndarray:
         return x - np.average(x, weights=weight)
 
     x, y1, y2 = map(centered, (rows.thrust, rows.force, rows.other))
-    assert strength == pytest.approx(np.mean(weight * y1 * y2))
     assert scale == pytest.approx(np.sum(weight * x * (y1 + y2) / 2) / np.sum(weight * y1 * y2))
     np.testing.assert_allclose(rest, x - scale * (y1 + y2) / 2, atol=1e-8)
     assert scale == pytest.approx(1.2, abs=0.01)  # by one measure alone, noise would take 4 % of it
@@ -204,8 +203,6 @@ def test_the_scale_is_that_of_two_instruments() -> None:
     _, losses, y1, y2 = (centered(v) for v in (wavy.thrust, wavy.losses, wavy.force, wavy.other))
     below = np.sum(weight * (y1 * y2 + losses * (y1 + y2) / 2))
     assert torque_scale._slope(wavy, weight)[0] == pytest.approx(np.sum(weight * x * (y1 + y2) / 2) / below)
-    chance = np.sqrt(np.mean(weight * y1**2) * np.mean(weight * y2**2) / 200)
-    assert torque_scale._no_strength(rows, weight) == pytest.approx(chance)
     slips = 0.1 * rows.force
     steepness = torque_scale._partial_slope(slips, rows, weight)
     assert steepness == pytest.approx(np.sum(weight * 0.1 * y1 * (y1 + y2) / 2) / np.sum(weight * y1 * y2))

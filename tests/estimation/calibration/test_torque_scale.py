@@ -138,8 +138,12 @@ def test_it_refuses_what_tells_nothing(drive: Make, vehicle: Vehicle) -> None:
     rng = np.random.default_rng(0)
     log = hilly(rng, 1.0, push_noise=0.5, pitch_noise=0.05)
     shuffled = log.with_channels(pitch=np.roll(log["pitch"], 3000))
-    with pytest.raises(InputError, match="vary too little"):
+    with pytest.raises(InputError, match="an interval that includes 0"):
         identify_torque_scale(shuffled, vehicle)
+    flat = {"ground_speed": 1.0, "acceleration_x": 0.0, "pitch": 0.0}
+    calm = log.with_channels(**{name: np.full(len(log), value) for name, value in flat.items()})
+    with pytest.raises(InputError, match="do not vary"):
+        identify_torque_scale(calm, vehicle)
 
 
 def test_a_window_spans_two_updates_of_the_slowest_torque() -> None:

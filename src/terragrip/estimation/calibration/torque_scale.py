@@ -52,7 +52,6 @@ _STRETCH = 6  # windows without labels that may be a soil of their own
 _HUBER = 2.5
 _LABEL = "give a 'soil' column (for one soil 'soil: {constant: field}' in the profile), or change the pull every few seconds"
 _ROUNDING = 1e-9  # of a nuisance term, which is of size 1
-_STRONG = 3.0  # the instruments' covariance over its error
 
 
 @dataclass(frozen=True)
@@ -93,21 +92,21 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
         )
     table = table.select(used)
     rows = _balance(table, vehicle)
-    scale, strength, residual, weight = _fit(rows)
+    scale, residual, weight = _fit(rows)
     if scale == 0:
         raise InputError(
             "the torques are the same whatever the pull",
             file=logs[0].source,
             hint="map columns that measure them: one value throughout does not",
         )
-    by_soil = _by_stretches(table, rows, scale)
-    error = float(np.hypot(_jackknife(rows, weight), by_soil))
-    if not strength > _STRONG * _no_strength(rows, weight):
+    if not np.isfinite(scale):
         raise InputError(
-            "pull, acceleration and slope vary too little to determine the torque scale",
+            "pull, acceleration and slope do not vary, so that nothing determines the torque scale",
             file=logs[0].source,
             hint="use a log with starts, stops, slopes or a towed load",
         )
+    by_soil = _by_stretches(table, rows, scale)
+    error = float(np.hypot(_jackknife(rows, weight), by_soil))
     considered = np.hypot(
         _SLIP_RESISTANCE * vehicle.mass * GRAVITY * _partial_slope(rows.slip, rows, weight),
         np.hypot(_drawbar_gain(table, vehicle), _unseen_slope(vehicle, rows, weight, residual)),
@@ -131,14 +130,16 @@ def identify_torque_scale(recordings: Recording | Sequence[Recording], vehicle: 
     return Quantity("drive_torque_scale", float(scale), std, "1", rests_on, sentence)
 
 
-def _fit(rows: _Balance) -> tuple[float, float, Floats, Floats]:
-    """K, the strength and the residual as of `_slope`, and the weights, by iterated weighting."""
+def _fit(rows: _Balance) -> tuple[float, Floats, Floats]:
+    """K and the residual as of `_slope`, and the weights, by iterated weighting."""
     weight = np.ones(len(rows.thrust))
     for _ in range(30):
-        scale, strength, residual = _slope(rows, weight)
+        scale, residual = _slope(rows, weight)
+        if not np.isfinite(scale):
+            break
         robust = 1.4826 * float(np.median(np.abs(residual)))
         weight = np.minimum(1.0, _HUBER * max(robust, 1e-12) / np.maximum(np.abs(residual), 1e-12))
-    return scale, strength, residual, weight
+    return scale, residual, weight
 
 
 def _by_stretches(table: Windows, rows: _Balance, scale: float) -> float:
@@ -228,22 +229,15 @@ def _within(values: Floats, stretch: Ints, weight: Floats) -> Floats:
     return values - (sums / np.bincount(stretch, weight)[:, None])[stretch]
 
 
-def _slope(rows: _Balance, weight: Floats) -> tuple[float, float, Floats]:
-    """K, the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance terms removed."""
+def _slope(rows: _Balance, weight: Floats) -> tuple[float, Floats]:
+    """K, by the covariance of the two measures of Y, and the residual X - K (Y + losses) (n,), nuisance terms removed."""
     table = np.column_stack([rows.thrust, rows.losses, rows.force, rows.other])
     x, losses, y1, y2 = _centered(table, rows, weight).T
-    strength = float(np.mean(weight * y1 * y2))
     instrument = (y1 + y2) / 2
     # X = K (Y + losses): the losses are known, so they are added to Y in the denominator.
-    below = strength + float(np.mean(weight * losses * instrument))
+    below = float(np.mean(weight * (y1 * y2 + losses * instrument)))
     scale = float(np.mean(weight * x * instrument)) / below if below else np.nan
-    return scale, strength, x - scale * (instrument + losses)
-
-
-def _no_strength(rows: _Balance, weight: Floats) -> float:
-    """Standard error of the covariance of the two measures of Y if they had nothing in common."""
-    y1, y2 = _centered(np.column_stack([rows.force, rows.other]), rows, weight).T
-    return float(np.sqrt(np.mean(weight * y1**2) * np.mean(weight * y2**2) / len(weight)))
+    return scale, x - scale * (instrument + losses)
 
 
 def _jackknife(rows: _Balance, weight: Floats) -> float:
