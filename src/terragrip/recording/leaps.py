@@ -35,6 +35,7 @@ _BEYOND = 3.0  # standard deviations of what the balance is left with all the ti
 _STEPS = 1.5  # of a channel's resolution: one step of it is no leap
 _HALF = 0.5  # of it, at least, is between two samples
 _REST = 0.25  # of it, at most, is answered, or gone again
+_SLIPS = 0.05  # of slip, at least, by which wheels answer
 _SOON = 1.0  # s before and after: a tool's pull, or a start into other soil, leaps in part and is answered while it still changes
 
 
@@ -77,7 +78,20 @@ def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         parts["drawbar_force"] = -channels["drawbar_force"] / vehicle.mass
     climb = STANDARD_GRAVITY * np.sin(channels["pitch"]) if "pitch" in channels else np.zeros(len(recording))
     axles = [[f"drive_torque_{w}" for w in axle.wheels if w in radii] for axle in vehicle.axles.values()]
-    return _unanswered(recording, drive, parts, climb, axles)
+    return _unanswered(recording, drive, parts, climb, axles, _slip(recording, drive, radii))
+
+
+def _slip(recording: Recording, drive: _Drive, radii: dict[str, float]) -> Floats:
+    """The driven wheels' mean slip (n,), as far as rims and ground speed show it; 0 where a rim is in no channel."""
+    names = [f"wheel_speed_{wheel}" for wheel in radii]
+    if not all(
+        name in recording.channels and np.isfinite(recording.channels[name]).sum() > 1 for name in names
+    ):
+        return np.zeros(len(recording))
+    rims = [filled(drive.time, recording.channels[n]) * r for n, r in zip(names, radii.values(), strict=True)]
+    rim = np.mean(rims, axis=0)
+    faster = np.where(np.abs(rim) < np.abs(drive.speed), drive.speed, rim)
+    return np.asarray(1.0 - drive.speed / np.where(faster == 0.0, 1.0, faster) * (faster != 0.0), np.float64)
 
 
 def _drive_of(recording: Recording) -> _Drive | None:
@@ -101,7 +115,12 @@ def _drive_of(recording: Recording) -> _Drive | None:
 
 
 def _unanswered(
-    recording: Recording, drive: _Drive, parts: dict[str, Floats], climb: Floats, axles: list[list[str]]
+    recording: Recording,
+    drive: _Drive,
+    parts: dict[str, Floats],
+    climb: Floats,
+    axles: list[list[str]],
+    slip: Floats,
 ) -> list[str]:
     """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with; ``axles``: the torques of each."""
     if any(np.isfinite(part).sum() < 2 for part in (*parts.values(), climb)):
@@ -127,6 +146,10 @@ def _unanswered(
     rows &= np.abs(
         total[np.searchsorted(drive.middle, drive.middle + _SOON)] - total[first] - leap
     ) < _HALF * np.abs(leap)
+    # Wheels that slip less by as much as they push less push less: the ground resists less from one metre to the next.
+    turned = drive.shift(slip)
+    known = MAD_TO_SD * median(np.abs(turned[drive.inside]))
+    rows &= ~(turned * leap > np.maximum(_BEYOND * known, _SLIPS) * np.abs(leap))
     found: dict[tuple[str, ...], list[int]] = {}
     for k in np.flatnonzero(rows):
         found.setdefault(tuple(name for name in parts if leaps[name][k]), []).append(int(k))
