@@ -27,7 +27,7 @@
 #define TG_MAX_CONSIDERED 16
 /* Bytes, aligned as a double, that hold a tg_estimator: storage without malloc. Of any policy, of TG_FIXED; of filters: end of this file. */
 #define TG_ESTIMATOR_ROOM 81920
-#define TG_ESTIMATOR_ROOM_FIXED 40960
+#define TG_ESTIMATOR_ROOM_FIXED 43008
 
 /* A program and its kernel must agree on the precision: whoever includes this header asks the linker for the symbol of its own. */
 #ifdef TG_FLOAT
@@ -483,6 +483,7 @@ struct tg_filter {
     double clock;                        /* s, the sum of dt */
     tg_real drag[8], arm[8];             /* r rho_w/J, 1/s, and r/J, 1/(kg m) */
     tg_real inverse_inertia[8], inverse_mass;
+    tg_real moves[8];                    /* time over which a wheel moves in a step, over the step's: 1, but for wheels.c */
     tg_real stiffness;                   /* 1/s, largest drag */
     tg_real slope[2], cosine[2], sine[2]; /* of the last two slopes */
     tg_real walk[TG_ROWS];

@@ -13,7 +13,7 @@ static void measured(const tg_estimator *e, const tg_row *row, tg_real *y, tg_re
     const tg_real d = (tg_real)e->direction;
     for (int32_t i = 0; i < n; i++) {
         y[i] = d * row->value[TG_WHEEL_SPEED + i];
-        r[i] = row->held_wheels >> i & 1 ? row->wheel_variance[i] : e->constants.variance[TG_WHEEL_SPEED + i] + row->doubt[i];
+        r[i] = row->steady_wheels >> i & 1 ? row->wheel_variance[i] : e->constants.variance[TG_WHEEL_SPEED + i] + row->doubt[i];
     }
     y[n] = d * row->value[TG_GROUND_SPEED];
     r[n] = row->ground_variance;
@@ -45,7 +45,7 @@ static tg_real supervisor_of(const tg_estimator *e, const tg_step *step)
  * a held wheel speed or a reckoned ground speed in it, which are no measurements, the row's NIS is the sum of the measured channels'. */
 static void watch_consistency(tg_estimator *e, tg_row *row, const tg_step *step, const tg_real *r)
 {
-    int32_t count = 0, n = e->settings.machine.wheels, not_measured = row->held_wheels | (row->reckoned ? 1 << n : 0);
+    int32_t count = 0, n = e->settings.machine.wheels, not_measured = row->steady_wheels | (row->reckoned ? 1 << n : 0);
     tg_real sum = 0;
     for (int32_t c = 0; c < n + 2; c++) {
         if (isnan(step->innovation[c]) || not_measured >> c & 1) continue;
@@ -282,13 +282,13 @@ static void estimate_row(tg_estimator *e, const tg_sample *sample, tg_row *row, 
     tgi_track_turn(e, row);
     tg_real q[TG_MAX_STATES];
     tgi_update_inputs(e, row, dt, &drive);
+    const tg_course course = course_of(e, row, was_standing, turned, &gap);
+    tgi_time_wheels(e, dt, course >= TG_START, row);
     tgi_input_noise(e, &drive, dt, row, q);
     tgi_loads(e, row, &drive);
     tgi_along(e, &drive, &now);
-    tg_course course = course_of(e, row, was_standing, turned, &gap);
     if (!e->started) e->ground_time = row->time;
     tgi_reckon(e, &drive, dt, course == TG_GO, row, q);
-    if (e->settings.method == TG_FILTERED) tgi_hold_wheels(e, course == TG_GO ? dt : 0, row);
     report_adaptation(e, out->value);
     const int32_t lost = !go_on(e, row, &drive, &now, course, dt, q), breaks = gap || lost, flows = course == TG_GO && !breaks && !e->braked;
     balance_forces(e, &drive, row->time);

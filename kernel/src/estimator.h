@@ -15,9 +15,9 @@ typedef struct { /* an input between its samples */
     tg_real rate;     /* 1/s, of the change between them */
     tg_real bend, bends; /* square of what that change is beyond the one before, over the same time; its mean */
     tg_real spike;    /* square of the last increment where that was a spike, else 0 */
-    double time;      /* of the last sample */
+    double time;      /* of the last sample, */
+    double since;     /* and of the row before it: the step between the two has it, too */
     int32_t count;    /* samples seen, saturating */
-    int32_t fresh;    /* this row holds a sample that is no spike */
 } tg_hold;
 
 typedef struct { /* a measured speed as it decides standstill and the direction of travel */
@@ -32,9 +32,9 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     int32_t measured; /* any wheel or ground speed */
     int32_t outlier;
     tg_real missed_braking; /* of a braked vehicle: variance of rho_s by the brake before its first sample */
-    int32_t reckoned; /* the ground speed is not measured but reckoned */
-    int32_t held_wheels; /* bits: the wheel's speed is not measured but held, with this variance */
+    int32_t steady_wheels; /* bits: the wheel's speed is not measured but steady, with this variance, see wheels.c */
     tg_real wheel_variance[8];
+    int32_t reckoned; /* the ground speed is not measured but reckoned */
     tg_real chatter[8]; /* variance of the wheel's speed by what alternates from sample to sample, see inputs.c */
     tg_real ground_variance;
     tg_real turn_variance; /* of the ground speed, by what a turn adds to it at its receiver */
@@ -47,6 +47,7 @@ typedef struct { /* what a row's values need beside the belief; all reals, so th
     tg_real hub[8];  /* wheel, m/s: what its hub is faster than the vehicle, along the travel */
     tg_real warp[8]; /* wheel: the part of its adhesion beyond all trends that is not load, see warp.c */
     tg_real doubt[8]; /* wheel: variance of an adhesion that alternates from sample to sample, or whose torque may have leapt, see doubt.c, */
+    tg_real since_sample[8]; /* wheel: variance of what its speed has moved by since its last sample, see wheels.c */
     tg_real sides[8]; /* and of one by as much as the other side's is off the other way: the vehicle's forces do not contain it */
     tg_real across[8]; /* steered wheel, m/s: its hub's speed across the vehicle; else 0 */
     tg_real turn[8]; /* wheel: variance of its slip by a turn that no sensor shows */
@@ -84,6 +85,12 @@ typedef struct { /* the estimate with its spreads, along the travel; the filter'
     int32_t channels;
     tg_real nis, supervisor;
 } tg_belief;
+
+typedef struct { /* a wheel's own time, see wheels.c */
+    double until;  /* the time up to which the model has moved its speed, */
+    double torque; /* and from which it has done so by the last torque */
+    tg_real step;  /* s, of this row: what `until` moved by */
+} tgi_own_time;
 
 #define TG_SPEED_STATES (TG_MAX_WHEELS + 2)
 #define TG_SPEED_MODES 9
@@ -150,7 +157,7 @@ struct tg_estimator {
     tg_hold torque[8], drawbar, pitch, axle_load[8], mass, hitch_load;
     tg_hold wheel[8], ground;  /* speeds */
     tg_hold forward;           /* acceleration */
-    int32_t sparse_wheels;
+    tgi_own_time turned[8];        /* see wheels.c */
     int32_t rolls;             /* bits: a free wheel whose speed was never measured, which goes as its hub does */
     int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c, */
     int32_t locked[8];         /* and its speed */
@@ -240,7 +247,7 @@ void tgi_slope_correct(tgi_slope *s, tg_real speed, tg_real noise);
 void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real dt, tg_drive *drive);
 
 /* wheels.c */
-void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row);
+void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row);
 
 /* reckoning.c */
 void tgi_reset_slips(tg_estimator *e);

@@ -36,9 +36,10 @@ const tgi_field tgi_settings_fields[] = {
 #undef T
 #define T tg_hold
 static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, raw), REALS(T, calm),
-                                 REALS(T, level), REALS(T, rate), REALS(T, bend), REALS(T, bends), REALS(T, interval), REALS(T, spike), DOUBLES(T, time),
-                                 INTEGERS(T, count, 0, 100), FLAG(T, fresh), END};
+                                 REALS(T, level), REALS(T, rate), REALS(T, bend), REALS(T, bends), REALS(T, interval), REALS(T, spike), DOUBLES(T, time), DOUBLES(T, since),
+                                 INTEGERS(T, count, 0, 100), END};
 #undef T
+static const tgi_field own_time[] = {DOUBLES(tgi_own_time, until), DOUBLES(tgi_own_time, torque), REALS(tgi_own_time, step), END};
 static const tgi_field lowpass[] = {REALS(tg_lowpass, value), DOUBLES(tg_lowpass, time), FLAG(tg_lowpass, seen), END};
 static const tgi_field settling[] = {REALS(tgi_settling, settled), REALS(tgi_settling, soon), DOUBLES(tgi_settling, time), FLAG(tgi_settling, seen), END};
 
@@ -95,7 +96,7 @@ static const tgi_field consider[] = {REALS(tg_consider, s), REALS(tg_consider, p
 const tgi_field tgi_estimator_fields[] = {
     REALS(T, deviations), FLAG(T, started), FLAG(T, seen_motion), FLAG(T, standing), INTEGERS(T, direction, -1, 1), DOUBLES(T, time),
     DOUBLES(T, measured_time), DOUBLES(T, distance), REALS(T, last_raw), DOUBLES(T, last_raw_time), HOLDS(torque), HOLDS(drawbar), HOLDS(pitch),
-    HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), FLAG(T, sparse_wheels), INTEGERS(T, rolls, 0, 255), INTEGERS(T, shared, 0, 8), INTEGERS(T, locked, 0, 8), INTEGERS(T, unseen, 0, 3),
+    HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), INSIDE(T, turned, tgi_own_time, own_time), INTEGERS(T, rolls, 0, 255), INTEGERS(T, shared, 0, 8), INTEGERS(T, locked, 0, 8), INTEGERS(T, unseen, 0, 3),
     FLAG(T, braked), FLAG(T, pressed), REALS(T, unbraked), DOUBLES(T, unbraked_time), DOUBLES(T, braked_time),
     REALS(T, yaw_rate), DOUBLES(T, yaw_time), REALS(T, unseen_turn), DOUBLES(T, leap_time), INSIDE(T, settling, tgi_settling, settling),
     LOWPASS(acceleration), LOWPASS(lateral), LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed),

@@ -86,6 +86,7 @@ tg_status tg_filter_init(tg_filter *f, const tg_machine *machine, const tg_tunin
     f->stride = stride;
     f->inverse_mass = 1 / machine->mass;
     for (int i = 0; i < n; i++) {
+        f->moves[i] = 1;
         f->inverse_inertia[i] = 1 / machine->inertia[i];
         f->arm[i] = machine->radius[i] * f->inverse_inertia[i];
         f->drag[i] = f->arm[i] * machine->bearing_resistance[i];

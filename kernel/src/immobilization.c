@@ -136,7 +136,7 @@ static void watch_digging(tg_estimator *e, const tg_row *row, const tgi_view *l,
 /* Where the ground speed was measured, for a reckoned one follows from the slip last seen. Slower than the standstill speed is standing.
  * Time counts from when the vehicle may stand, for an estimate comes after the fact; stuck is what surely does not go freely. What surely
  * goes against its rims slides, or still goes the way it came: it does not stand. Of a vehicle that was warned of it suffices that it may
- * stand; else the estimate itself says so, for a start is as slow. */
+ * stand; else the estimate itself says so, for a start is as slow. Of a speed that leaps the next sample tells. */
 static void watch_stuck(tg_estimator *e, const tg_row *row, const tgi_view *l)
 {
     const tg_watch_settings *s = &e->settings.watch;
@@ -194,7 +194,7 @@ void tgi_watch_over(tg_estimator *e, const tg_row *row, const tg_drive *drive, i
     if (!rests && moving && slips) {
         const int32_t measured = !row->reckoned && !isnan(row->value[TG_GROUND_SPEED]);
         const tgi_view l = view_of(e, row, measured, o);
-        if (measured) watch_stuck(e, row, &l);
+        if (measured && !(row->doubt[TG_GROUND_SPEED] > 0)) watch_stuck(e, row, &l);
         watch_digging(e, row, &l, measured);
     }
     tgi_digging_report(&w->digging, o);

@@ -28,7 +28,6 @@ static tg_real before_spike(const tg_hold *h, tg_real x)
 /* The first sample, or the first after a pause, which is no increment: nothing shows what came before it. */
 static void begin(tg_hold *h, tg_real x, tg_real noise)
 {
-    h->fresh = h->count > 0;
     h->value = h->calm = x;
     h->variance = noise * noise;
     h->rate = h->bend = h->spike = 0;
@@ -45,11 +44,10 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
     const tg_tuned *const k = &e->settings.tuned;
     const int32_t moving = !e->standing;
     const tg_real x = row->value[slot], noise = e->settings.noise[slot], interval = (tg_real)(row->time - h->time);
-    h->fresh = 0;
     if (isnan(x)) return;
     if (h->count == 0 || interval > e->settings.gap + TG_PAUSE * h->interval) begin(h, x, noise);
     else {
-        const tg_real before = before_spike(h, x), most = k->spike * k->spike * (h->level + 2 * noise * noise);
+        const tg_real before = before_spike(h, x), most = k->spike * k->spike * (h->level + noise * noise);
         const tg_real usual = h->interval > 0 && h->interval < interval ? h->interval : interval;
         tg_real change = tgi_square(x - before);
         h->spike = 0;
@@ -63,16 +61,16 @@ void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32
             const tg_real ahead = TG_AHEAD * h->interval;
             h->bend = h->count > 1 ? tgi_square(x - before - h->rate * (interval < ahead ? interval : ahead)) : 0;
             h->rate = (x - before) / interval;
-            h->fresh = 1;
         }
         tg_real memory = interval / (k->increment_memory + interval);
         if (memory * (tg_real)h->count < 1) memory = 1 / (tg_real)h->count; /* a plain mean at first */
         if (moving) h->level += memory * (change - h->level);
-        if (moving && h->fresh) h->bends += memory * (h->bend - h->bends);
+        if (moving && !(h->spike > 0)) h->bends += memory * (h->bend - h->bends);
         h->interval = interval;
     }
     h->raw = x;
     h->time = row->time;
+    h->since = e->started ? e->time : row->time;
     if (h->count == 0 || (moving && h->count < 100)) h->count++;
 }
 
@@ -83,7 +81,6 @@ static void believe_leap(tg_hold *h)
     h->rate = (h->raw - h->calm) / h->interval;
     h->value = h->calm = h->raw;
     h->spike = 0;
-    h->fresh = 1;
 }
 
 /* Of `among` inputs of the wheels, leaps of most at the same instant, one way and alike to a factor of two, are a manoeuvre, no spikes.
@@ -108,24 +105,27 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t am
     }
 }
 
-/* Error of one input as extra variance of its state over the step that ends at `time`. A step that ends with a sample uses it whole: a
- * wheel's slip settles within milliseconds, so that the torque of an instant is the adhesion of that instant
- * (docs/decisions/0096). Its error is the sample's noise, and what the input does beside the straight line
- * since the last one: a ramp does nothing; an input that walks at random (Brownian bridge) or jumps at some instant in between adds the
- * twelfth of its squared increment, and its second difference has two of these squares, and six of the noise. Where the step does not end
- * with a sample, the last value is used: its error stays the same, so that `age` after it it has moved the state by (age error), and this
- * step adds error^2 (age^2 - (age - dt)^2); and the input continues as a random walk w, of whose integral the variance is w age^3/3.
- * `unknown` is the variance before the first sample and once the last one is older than a gap. */
-static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real dt, tg_real noise, tg_real unknown)
+/* Error of one input as extra variance of its state over the `step` (s) that ends at `time`, the last of the `used` s in which the state moves
+ * by the input's last sample. A step in which a sample comes uses it whole: a wheel's slip settles within milliseconds, so that the torque of
+ * an instant is the adhesion of that instant (docs/decisions/0096). Its error is the sample's noise, and what the input does beside the
+ * straight line since the last one: a ramp does nothing; an input that walks at random (Brownian bridge) or jumps at some instant in between
+ * adds the twelfth of its squared increment, and its second difference has two of these squares, and six of the noise. The error stays the same
+ * until the next sample, so that it has moved the state by (error used), and this step adds error^2 (used^2 - (used - step)^2). From its
+ * sample on the input continues as a random walk w, of whose integral the variance is w age^3/3. `unknown` is the variance before the first
+ * sample and once the last one is older than a gap. */
+static tg_real held_noise(const tg_estimator *e, const tg_hold *h, double time, tg_real step, tg_real used, tg_real noise, tg_real unknown)
 {
-    if (h->count == 0 || (h->count == 1 && time == h->time)) return dt * unknown; /* over the step before its first sample, too */
-    if (h->fresh) {
-        const tg_real bend = (h->bend > h->bends ? h->bend : h->bends) / 2 - 3 * noise * noise;
-        return dt * dt * (noise * noise + (bend > 0 ? bend * dt / (12 * h->interval) : 0));
+    const tg_real age = (tg_real)(time - h->time);
+    const int32_t comes = age < step;
+    if (h->count == 0 || (h->count == 1 && comes)) return step * unknown; /* over the step before its first sample, too */
+    if (comes) used = step;
+    const tg_real since = comes ? 0 : age - step, walked = h->spike > 0 && comes ? step : age;
+    tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
+    if (comes && !(h->spike > 0)) {
+        const tg_real bend = (h->bend > h->bends ? h->bend : h->bends) / 2 - 3 * noise * noise, over = step < h->interval ? step : h->interval;
+        if (bend > 0) constant += bend * over / (12 * h->interval);
     }
-    const tg_real age = h->spike > 0 && time == h->time ? dt : (tg_real)(time - h->time), since = age - dt;
-    const tg_real constant = noise * noise + h->spike + (age > e->settings.gap ? unknown : 0);
-    return dt * (2 * age - dt) * constant + tgi_walk(h, noise) * (age * age * age - since * since * since) / 3;
+    return step * (2 * used - step) * constant + tgi_walk(h, noise) * (walked * walked * walked - since * since * since) / 3;
 }
 
 /* Factor on the random walks in use: of the bank the mean over its modes, as they may have changed in dt. */
@@ -195,7 +195,7 @@ static void brake_noise(const tg_estimator *e, const tg_row *row, tg_real dt, tg
     const tg_real share = row->missed_braking > 0 ? 1 : dt / (tg_real)TG_BRAKE_TIME;
     q[2 * n + 1] += row->missed_braking;
     for (int32_t i = 0; i < n; i++) {
-        q[i] += 2 * e->settings.gap * dt * e->constants.unknown_torque[i] * tgi_square(e->filter.inverse_inertia[i]);
+        q[i] += 2 * e->settings.gap * e->turned[i].step * e->constants.unknown_torque[i] * tgi_square(e->filter.inverse_inertia[i]);
         q[n + 1 + i] += tgi_square(e->settings.prior_adhesion_std) * share;
     }
 }
@@ -238,17 +238,17 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     q[2 * n + 1] = hills * dt;
     for (int32_t i = 0; i < n; i++) {
         row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);
-        if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * dt / e->wheel[i].interval;
+        if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * e->turned[i].step / e->wheel[i].interval;
     }
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i])
-            q[i] += held_noise(e, &e->torque[i], time, dt, s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
+            q[i] += held_noise(e, &e->torque[i], time, e->turned[i].step, (tg_real)(time - e->turned[i].torque), s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(e->filter.inverse_inertia[i]);
     if (e->drawbar.count > 0 || s->towing)
-        q[n] += held_noise(e, &e->drawbar, time, dt, s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);
+        q[n] += held_noise(e, &e->drawbar, time, dt, (tg_real)(time - e->drawbar.since), s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);
     if (e->braked) brake_noise(e, row, dt, q);
     if (e->pitch.count > 0)
-        q[n] += held_noise(e, &e->pitch, time, dt, s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
+        q[n] += held_noise(e, &e->pitch, time, dt, (tg_real)(time - e->pitch.since), s->noise[TG_PITCH], tgi_square(s->tuned.unknown_slope)) * tgi_square(s->machine.gravity);
 }
 
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive)

@@ -38,7 +38,10 @@ TG_INLINE tg_status plan_check_input(const tg_input *u, const int n)
 TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real dt, tgi_plan *plan, const int n)
 {
     tg_passage *const p = &plan->passage;
-    const tg_real stretch = f->stiffness * dt / TG_SUBSTEP;
+    tg_real longest = 1;
+    for (int i = 0; i < n; i++)
+        if (f->moves[i] > longest) longest = f->moves[i];
+    const tg_real stretch = f->stiffness * longest * dt / TG_SUBSTEP;
     if (!(stretch <= TG_SUBSTEPS_MAX)) return TG_BAD_ARGUMENT;
     for (int i = 0; i < TG_MAX_WHEELS; i += TG_LANES) { /* places beyond the last wheel stay 0 */
         lanes_store(p->phi + i, lanes_all(0));
@@ -49,9 +52,9 @@ TG_INLINE tg_status plan_passage(const tg_filter *f, const tg_input *u, tg_real 
     plan->substeps = stretch > 1 ? (int32_t)tgi_ceil(stretch) : 1;
     const tg_real h = plan->substeps == 1 ? dt : dt / (tg_real)plan->substeps;
     for (int i = 0; i < n; i++) {
-        const tg_real z = -f->drag[i] * h;
+        const tg_real moved = f->moves[i] * h, z = -f->drag[i] * moved;
         p->phi[i] = 1 + z * (1 + z * ((tg_real)1 / 2 + z * ((tg_real)1 / 6 + z * ((tg_real)1 / 24))));
-        p->psi[i] = h * (1 + z * ((tg_real)1 / 2 + z * ((tg_real)1 / 6 + z * ((tg_real)1 / 24))));
+        p->psi[i] = moved * (1 + z * ((tg_real)1 / 2 + z * ((tg_real)1 / 6 + z * ((tg_real)1 / 24))));
     }
     if (plan->substeps > 1)
         for (int i = 0; i < n; i++) { /* the map, `substeps` times, by squaring */

@@ -128,22 +128,60 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     row->outlier = outlier;
     row->measured = measured;
     row->reckoned = 0;
-    row->held_wheels = 0;
+    row->steady_wheels = 0;
     for (int32_t k = 0; k < TG_MAX_CHANNELS; k++) row->channel_nis[k] = (tg_real)NAN;
     memset(row->doubt, 0, sizeof row->doubt); /* until tgi_doubt_speeds, which not every method calls */
     return TG_OK;
 }
 
+/* By how much the row's speed at `slot` is farther from the estimate, along the travel. */
+static tg_real beyond_estimate(const tg_estimator *e, const tg_row *row, int32_t slot, int32_t state)
+{
+    return (tg_real)e->direction * row->value[slot] - e->belief.x[state];
+}
+
+/* The same of the rims in the mean, as far as the row measures them. */
+static tg_real rims_beyond(const tg_estimator *e, const tg_row *row)
+{
+    const int32_t n = e->settings.machine.wheels;
+    tg_real sum = 0, count = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (isnan(row->value[TG_WHEEL_SPEED + i]) || e->wheel[i].spike > 0) continue;
+        sum += e->settings.rolling_radius[i] * beyond_estimate(e, row, TG_WHEEL_SPEED + i, n + 2 + i);
+        count++;
+    }
+    return count > 0 ? sum / count : 0;
+}
+
+/* The change a second of the speed at `slot` that is no spike: what a vehicle is capable of, but of a speed that is farther from the estimate
+ * than the errors of both, half of that since the last row and, of the ground's, what the rims have done explain none: then increments alone
+ * decide. */
+static tg_real possible_rate(const tg_estimator *e, const tg_row *row, int32_t slot)
+{
+    const int32_t n = e->settings.machine.wheels, ground = slot == TG_GROUND_SPEED, j = ground ? n + 1 : n + 2 + slot - TG_WHEEL_SPEED;
+    const tg_real rate = e->constants.agility[slot];
+    const tgi_scene *const s = &e->scene;
+    if (!e->seen_motion || e->standing) return rate;
+    tg_real off = tgi_square(beyond_estimate(e, row, slot, j)), variance = e->belief.P[j * (tgi_stride(n) + 1)] + e->constants.variance[slot];
+    if (ground) {
+        const tg_real with_rims = tgi_square(beyond_estimate(e, row, slot, j) - rims_beyond(e, row));
+        if (with_rims < off) off = with_rims;
+        variance = tgi_max(variance, s->reckoned) + s->slow_speed + s->disputed + s->late + row->turn_variance;
+    }
+    const tg_real meanwhile = rate / 2 * (tg_real)(row->time - e->time);
+    return off > tgi_square(e->settings.tuned.spike) * variance + tgi_square(meanwhile) ? (tg_real)TG_TINY : rate;
+}
+
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
- * is capable of is no spike; after a gap, of most wheels together. A jump of the accelerometer, which the slope and the loads would keep,
- * is left out until then. */
+ * is capable of is no spike, except of the ground speed where the estimate does not expect it; after a gap, of most wheels together. A jump
+ * of the accelerometer, which the slope and the loads would keep, is left out until then. */
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
 {
     const tg_real *const rate = e->constants.agility;
     const int32_t n = e->settings.machine.wheels;
-    for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, rate[i]);
-    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, rate[TG_GROUND_SPEED]);
+    for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, possible_rate(e, row, TG_WHEEL_SPEED + i));
     tgi_judge_leaps(e->wheel, rate, n, n, row->time);
+    tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, possible_rate(e, row, TG_GROUND_SPEED));
     for (int32_t i = 0; i <= n; i++) {
         const tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
         const tg_real doubt = h->time == row->time ? h->spike : 0;
@@ -226,14 +264,25 @@ static tg_real pushed_to(const tg_estimator *e, const tg_row *row, tg_real speed
     return acceleration * (tg_real)(row->time - before->time);
 }
 
-/* Whether the row's ground speed is a leap at standstill: while no wheel turns, it counts once it has lasted, since a single one is the
+/* Whether the vehicle goes against its direction of travel by this ground speed alone: no wheel did so before. */
+static int32_t goes_back_alone(const tg_estimator *e, const tg_row *row, tg_real speed)
+{
+    const tg_settings *const s = &e->settings;
+    const tg_real d = (tg_real)e->direction;
+    if (!(d * speed < 0)) return 0;
+    for (int32_t i = 0; i < s->machine.wheels; i++)
+        if (tgi_is_recent(e, i, row->time) && d * s->rolling_radius[i] * e->settling[i].soon < -s->standstill_speed) return 0;
+    return 1;
+}
+
+/* Whether the row's ground speed is a leap, at standstill or against all wheels: it counts once it has lasted, since a single one is the
  * sensor's, or where the torques explain it: a sensor may show no slow turn. */
 static int32_t leaps(tg_estimator *e, const tg_row *row)
 {
     const tg_settings *const s = &e->settings;
     const tg_real speed = row->value[TG_GROUND_SPEED], least = 2 * (s->standstill_speed + s->noise[TG_GROUND_SPEED]);
     if (isnan(speed)) return 0;
-    if (!e->standing || tgi_fabs(speed) < least + pushed_to(e, row, speed)) {
+    if (!(e->standing || goes_back_alone(e, row, speed)) || tgi_fabs(speed) < least + pushed_to(e, row, speed)) {
         e->leap_time = (double)INFINITY;
         return 0;
     }

@@ -33,7 +33,7 @@ TG_INLINE tgi_moments moments_of(const tg_belief *b, const tg_real (*S)[TG_MAX_C
     c.wm = every(Pw + i, stride + 1) + products(S, w, i, 1, columns);
     c.wr = every(Pw + r, stride) + products(S, w, r, 0, columns);
     c.wv = every(Pw + v, stride) + products(S, w, v, 0, columns);
-    c.ww = every(Pw + w, stride + 1) + products(S, w, w, 1, columns);
+    c.ww = every(Pw + w, stride + 1) + products(S, w, w, 1, columns) + lanes_load(scene->since_sample + i);
     return c;
 }
 

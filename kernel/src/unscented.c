@@ -25,11 +25,11 @@ TG_INLINE void model_move(const tg_filter *f, const tgi_plan *plan, tg_real *x, 
     x[n + 1] += plan->passage.dt * rate[0];
     for (int32_t step = 0; step < plan->substeps; step++)
         for (int i = 0; i < n; i++) {
-            const tg_real k1 = rate[1 + i] - omega[i] * f->drag[i];
-            const tg_real k2 = rate[1 + i] - (omega[i] + h / 2 * k1) * f->drag[i];
-            const tg_real k3 = rate[1 + i] - (omega[i] + h / 2 * k2) * f->drag[i];
-            const tg_real k4 = rate[1 + i] - (omega[i] + h * k3) * f->drag[i];
-            omega[i] += h / 6 * (k1 + 2 * (k2 + k3) + k4);
+            const tg_real moved = f->moves[i] * h, k1 = rate[1 + i] - omega[i] * f->drag[i];
+            const tg_real k2 = rate[1 + i] - (omega[i] + moved / 2 * k1) * f->drag[i];
+            const tg_real k3 = rate[1 + i] - (omega[i] + moved / 2 * k2) * f->drag[i];
+            const tg_real k4 = rate[1 + i] - (omega[i] + moved * k3) * f->drag[i];
+            omega[i] += moved / 6 * (k1 + 2 * (k2 + k3) + k4);
         }
 }
 

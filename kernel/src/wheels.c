@@ -1,22 +1,46 @@
-/* Wheel speeds between their samples (R; docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so that its
- * speed changes as slowly as the vehicle's, while a torque's noise, or an old torque, integrated over the time between would make it run
- * away. There the last sample is used for the speed, and the adhesion follows the torque. */
+/* Each wheel's own time (docs/decisions/0171-each-wheel-moves-by-its-own-samples.md). A wheel's slip settles within milliseconds, so that its
+ * speed changes as slowly as the vehicle's, while a torque's noise, or an old torque, integrated between two samples of the speed would make
+ * it run away. So the model moves a wheel from sample to sample of its speed, by the torque of the later one; in rows between, it waits.
+ * Where torques come faster than the speed, it moves with each of them, too, and its speed is steady: so the adhesion follows the torque. */
 #include "estimator.h"
 
-/* Give the row the speeds of wheels that it does not measure; `dt` 0: none. All rows until the next sample share one error, and so
- * count as one measurement together. */
-void tgi_hold_wheels(tg_estimator *e, tg_real dt, tg_row *row)
+#define TG_FASTER ((tg_real)1.5) /* times as often as the wheel's speed is its torque measured: not by chance */
+
+/* What the speed moves by, mean square, in the time since its last sample. */
+static tg_real moved_since(const tg_estimator *e, int32_t i, tg_real age)
 {
-    const int32_t n = e->settings.machine.wheels;
-    for (int32_t i = 0; i < n; i++) e->sparse_wheels |= isnan(row->value[TG_WHEEL_SPEED + i]);
-    if (!e->sparse_wheels) return;
-    for (int32_t i = 0; i < n; i++) {
-        const tg_hold *const h = &e->wheel[i];
-        const tg_real noise = e->settings.noise[TG_WHEEL_SPEED + i], x = row->value[TG_WHEEL_SPEED + i];
+    const tg_hold *const h = &e->wheel[i];
+    return tgi_motion(h, e->settings.noise[TG_WHEEL_SPEED + i]) * age / h->interval;
+}
+
+/* Give the row the wheel's speed as it was. All rows until the next sample share one error, and so count as one measurement together. */
+static void keep_steady(const tg_estimator *e, int32_t i, tg_real age, tg_row *row)
+{
+    const tg_real noise = e->settings.noise[TG_WHEEL_SPEED + i];
+    row->value[TG_WHEEL_SPEED + i] = (tg_real)e->direction * e->belief.x[e->settings.machine.wheels + 2 + i];
+    row->wheel_variance[i] = (noise * noise + moved_since(e, i, age)) * e->wheel[i].interval / e->torque[i].interval;
+    row->steady_wheels |= 1 << i;
+}
+
+/* After the row's inputs: by how much time each wheel moves in this row. One whose sample is late waits no longer, and goes on from there. */
+void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
+{
+    for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
+        const tg_hold *const h = &e->wheel[i], *const torque = &e->torque[i];
+        tgi_own_time *const p = &e->turned[i];
         const tg_real age = (tg_real)(row->time - h->time);
-        if (!isnan(x) || h->count < 2 || h->spike > 0 || age > e->settings.tuned.wheel_late * h->interval || !(dt > 0)) continue;
-        row->value[TG_WHEEL_SPEED + i] = h->raw;
-        row->wheel_variance[i] = (noise * noise + tgi_motion(h, noise) * age / h->interval) * (h->interval / dt > 1 ? h->interval / dt : 1);
-        row->held_wheels |= 1 << i;
+        const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
+        const tg_real usual = tgi_max(h->interval, e->settings.held_period[TG_WHEEL_SPEED + i]);
+        const int32_t between = goes && missing && h->count > 1 && age <= e->settings.tuned.wheel_late * usual;
+        const int32_t steady = between && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
+        const int32_t waits = between && !steady;
+        e->scene.since_sample[i] = waits ? moved_since(e, i, age) : 0;
+        const double from = goes && (steady || !missing) ? p->until : e->time;
+        if (steady) keep_steady(e, i, age, row);
+        p->step = waits ? 0 : e->started ? (tg_real)(row->time - from) : 0;
+        e->filter.moves[i] = dt > 0 ? p->step / dt : 1;
+        if (waits) continue;
+        if (torque->time > from) p->torque = from;
+        p->until = row->time;
     }
 }

@@ -123,6 +123,15 @@ def test_leaps_of_a_slow_receiver_do_not_turn_a_machine_at_rest_around():
     assert np.abs(hit["adhesion_rr"] - plain["adhesion_rr"])[after].max() < 0.01
 
 
+def test_a_leap_of_the_ground_speed_against_the_wheels_does_not_turn_the_travel_around() -> None:
+    """Of a receiver at 2 Hz, in which time half of g makes 2.5 m/s, as the machine comes to rest."""
+    base = drive(20.0, rate=10.0, speed=lambda t: np.clip(0.05 * (14.0 - t), 0.0, 0.3)).recording
+    base = with_values(base, "ground_speed", np.arange(len(base)) % 5 != 0, np.nan)
+    for row in (130, 135):
+        hit = run(with_values(base, "ground_speed", row, base["ground_speed"][row] - 0.6))
+        assert (hit["adhesion_rr"][120:] > 0.0).all()
+
+
 def test_wheels_that_spin_on_the_spot_are_no_standstill():
     base = drive(10.0, slip=lambda t: 0.0 * t + 0.97, speed=lambda t: 0.02 + 0.0 * t)
     estimates = run(base.recording)
@@ -147,6 +156,17 @@ def test_a_spike_is_flagged_and_barely_moves_the_estimate(channel, method):
         for name, most in (("adhesion_rr", 0.03), ("soil_resistance", 0.02), ("slip_fr", 0.15)):
             assert np.abs(hit[name] - plain[name]).max() < most, name
     assert np.abs(hit["adhesion_rr"] - plain["adhesion_rr"])[900:].max() < 0.02
+
+
+def test_a_spike_that_a_vehicle_could_follow_is_one_where_nothing_else_moves() -> None:
+    """Of a receiver at 2 Hz, in which time half of g makes 2.5 m/s: torques and rims are as before."""
+    base = drive(30.0, rate=10.0).recording
+    base = with_values(base, "ground_speed", np.arange(len(base)) % 5 != 0, np.nan)
+    spiked = with_values(base, "ground_speed", 200, base["ground_speed"][200] - 0.7)
+    plain, hit = run(base), run(spiked)
+    assert hit["event"][200] == "outlier"
+    for name, most in (("adhesion_fl", 0.02), ("soil_resistance", 0.02), ("ground_speed", 0.05)):
+        assert np.abs(hit[name] - plain[name]).max() < most, name
 
 
 def test_a_spike_of_the_accelerometer_moves_neither_slope_nor_loads():

@@ -27,7 +27,7 @@ def joint(estimator: TractionEstimator, recording: Any) -> tuple[Any, Any, Any, 
     engine, ffi, lib = estimator.engine, _kernel.ffi, _kernel.lib
     time, columns = prepared(estimator, recording)
     last = engine.record(time, columns)[-1].copy()
-    assert len(last) > lib.tg_record_length(4, COLUMNS) > len(last) - 80  # the row's scene follows
+    assert len(last) > lib.tg_record_length(4, COLUMNS) > len(last) - 88  # the row's scene follows
     x, P, s = np.empty(10), np.empty((10, 10)), np.empty((COLUMNS, 10))
     pointers = (ffi.cast("double *", a.ctypes.data) for a in (last, x, P, s))
     assert lib.tg_record_moments(4, COLUMNS, *pointers) == lib.TG_OK

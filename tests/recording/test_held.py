@@ -196,3 +196,20 @@ def test_noise_beside_spoiled_values_is_that_of_the_others(every: int) -> None:
     time = np.arange(0, 60, 0.05)
     recording = Recording(time, {"wheel_speed_l": spoiled(motion(time, 4), every)})
     assert 0.025 < sensor_noise(recording)["wheel_speed_l"] < 0.055
+
+
+def rounded_with_spikes(seed: int, share: float) -> np.ndarray:
+    """A channel of a coarse sensor, .2 a step, and a share of spikes that are no multiples of it."""
+    rng = np.random.default_rng(seed)
+    values = 0.2 * np.round((3 + np.sin(np.arange(600) / 40) + 0.1 * rng.standard_normal(600)) / 0.2)
+    hit = rng.choice(600, round(share * 600), replace=False)
+    values[hit] += rng.choice([-1, 1], len(hit)) * 0.7175431718
+    return values
+
+
+@pytest.mark.parametrize("share", [0.005, 0.02, 0.05])
+def test_spikes_hide_neither_the_resolution_nor_that_a_channel_is_fresh(share: float) -> None:
+    for seed in range(5):
+        values = rounded_with_spikes(seed, share)
+        assert quantum(values) == pytest.approx(0.2)
+        assert held_period(np.arange(600) / 10, values) is None

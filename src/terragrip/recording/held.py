@@ -30,6 +30,8 @@ _REGULAR_SHARE = 0.6
 _LARGE_STEP = 1.5  # quanta: halfway between a single step and a double one
 _WORTH_A_LOOK = 0.01  # share of exact repeats below which a channel counts as fresh
 _ABSURD = 1e150
+_SPIKES = 0.25  # share of steps that may be to spikes and back; of continuous steps .96 are no multiples of anything
+_FINER = 4.0  # times a resolution: as much coarser may most steps be by chance
 _WILD = 1000.0  # times the usual size of what is not 0: from 100 on no digit of an ordinary log moves
 _ENOUGH = 1000  # values that show the usual size
 
@@ -109,22 +111,29 @@ def without_held(recording: Recording, held: dict[str, float] | None = None) -> 
 def quantum(values: Floats) -> float:
     """The quantum of a channel, its resolution: all steps between neighbours (n,) are multiples of it; 0 if there is none.
 
-    Euclid's algorithm on a sample of the steps; a remainder up to 2 % of the divisor counts as none. Spoiled values are left out.
+    By a sample of the steps, without spoiled values. Steps to spikes and back need be no multiples: a quarter of the steps may miss it,
+    unless what divides all but one in a hundred kinds of step is not much finer.
     """
     values = usual_values(values)
     steps = np.abs(np.diff(values))
-    size = float(np.max(np.abs(values), initial=0.0))
-    steps = np.unique(steps[steps > 1e-9 * size][:: max(1, len(steps) // 2000)])[:500]
-    if not len(steps):
-        return 0.0
-    step = float(steps[0])
-    while step > 1e-9 * size:
+    least = 1e-9 * float(np.max(np.abs(values), initial=0.0))
+    steps, count = np.unique(steps[steps > least][:: max(1, len(steps) // 2000)], return_counts=True)
+    steps, count = steps[:500], count[:500]
+    exact = _common_divisor(steps, np.ones(len(steps)), least, 0.01)
+    usual = _common_divisor(steps, count.astype(float), least, _SPIKES)
+    return exact if _FINER * exact >= usual else usual
+
+
+def _common_divisor(steps: Floats, weight: Floats, least: float, odd_share: float) -> float:
+    """Euclid's algorithm: a remainder up to 2 % of the divisor counts as none, and steps (n,) of that share of the weight may have one."""
+    step = float(steps[0]) if len(steps) else 0.0
+    while step > least:
         rest = np.mod(steps, step)
         rest = np.minimum(rest, step - rest)
-        rest = rest[rest > 0.02 * step]
-        if len(rest) <= 0.01 * len(steps):
+        odd = rest > 0.02 * step
+        if weight[odd].sum() <= odd_share * weight.sum():
             return step
-        step = float(rest.min())
+        step = float(rest[odd].min())
     return 0.0
 
 

@@ -1,0 +1,86 @@
+"""Each wheel moves by its own samples: a row for each message costs no accuracy, however far apart the messages of a cycle are."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import terragrip as tg
+from drives import drive, robot
+from terragrip.simulation import SimulationResult, families
+
+MACHINE = families.Kind("tractor", "brixius", "coarse")
+"""A torque rounded to a quarter of the adhesion: only many samples together tell it."""
+
+
+@cache
+def drawn() -> SimulationResult:
+    return families.draw(MACHINE, 8999801, rate=50.0, duration=60.0)
+
+
+def by_message(recording: tg.Recording, phases: dict[str, float]) -> tg.Recording:
+    """Each channel in rows of its own kind of message, so many seconds after the cycle's begin."""
+    phase = {
+        c: next((s for start, s in phases.items() if c.startswith(start)), 0.0) for c in recording.channels
+    }
+    used = sorted(set(phase.values()))
+    time = (recording.time[:, None] + np.array(used)).ravel()
+    channels = {}
+    for name, values in recording.channels.items():
+        channels[name] = np.full(len(time), np.nan)
+        channels[name][used.index(phase[name]) :: len(used)] = values
+    return tg.Recording(time, channels)
+
+
+def unexplained(estimates: tg.Estimates, per: int) -> float:
+    """Share of the adhesions' variance that the estimates miss in motion, in the last row of each cycle."""
+    truth, last = drawn().truth, slice(per - 1, None, per)
+    moves = np.abs(truth["true_ground_speed"].to_numpy()) > 0.1
+    true = np.stack([truth[f"true_adhesion_{w}"].to_numpy()[moves] for w in ("1l", "1r")])
+    known = np.stack([estimates[f"adhesion_{w}"][last][moves] for w in ("1l", "1r")])
+    return float(np.sum((known - true) ** 2) / np.sum((true - true.mean()) ** 2))
+
+
+@cache
+def in_one_row() -> float:
+    return unexplained(tg.estimate(drawn().recording, drawn().vehicle), 1)
+
+
+@pytest.mark.parametrize(
+    "phases",
+    [
+        {"drive": 0.002, "drawbar": 0.004, "ground": 0.006},
+        {"drive": 0.002, "wheel": 0.004},
+        {"drive": 0.01},
+        {"wheel": 0.002},
+    ],
+)
+def test_messages_of_a_cycle_in_rows_of_their_own_cost_no_accuracy(phases: dict[str, float]) -> None:
+    apart = by_message(drawn().recording, phases)
+    estimates = tg.estimate(apart, drawn().vehicle)
+    assert unexplained(estimates, len(apart) // len(drawn().recording)) < 1.05 * in_one_row()
+
+
+def test_both_engines_move_a_wheel_by_its_own_samples() -> None:
+    """They are two ways to the same moments, the model being affine."""
+    apart = by_message(drive(12.0, rate=20.0).recording, {"drive": 0.01, "ground": 0.02})
+    exact, unscented = (tg.estimate(apart, robot(), method) for method in ("kalman", "ukf"))
+    for name in ("adhesion_rr", "slip_fl", "wheel_speed_rl", "wheel_speed_rl_std", "soil_resistance_std"):
+        np.testing.assert_allclose(exact[name], unscented[name], rtol=1e-6, atol=1e-8, err_msg=name)
+
+
+def test_between_its_samples_a_wheel_waits_and_grows_unsure() -> None:
+    base = drive(40.0, rate=20.0, speed=lambda t: 0.6 + 0.3 * np.sin(0.8 * t)).recording
+    rows = np.arange(len(base))
+    channels = {
+        n: np.where(rows % 4 == 0, v, np.nan) if n.startswith(("wheel", "drive")) else v
+        for n, v in base.channels.items()
+    }
+    estimates = tg.estimate(tg.Recording(base.time, channels), robot())
+    later = rows > 200
+    deviations = [estimates["wheel_speed_rr_std"][later & (rows % 4 == k)].mean() for k in range(4)]
+    assert deviations == sorted(deviations)
+    steps = np.diff(estimates["wheel_speed_rr"])[(rows[1:] > 200) & (rows[1:] % 4 != 0)]
+    assert np.abs(steps).max() < 1e-3
