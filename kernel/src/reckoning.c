@@ -5,6 +5,7 @@
 
 #define TG_DRAWN 2             /* s over which it is summed what ground speeds draw the estimate by */
 #define TG_AGREED 5            /* s that speed, forces and wheels agree again: a drift may pass through what they agree on */
+#define TG_CALM 30             /* s without either sign against it: forces agree, so the ground is another one */
 #define TG_BEYOND ((tg_real)9) /* square of the SDs beyond which that, and a slip, are no chance */
 
 void tgi_reset_slips(tg_estimator *e)
@@ -49,6 +50,12 @@ static tg_real slip_at(const tg_tuned *k, tg_real slip, tg_real from, tg_real ad
     return result < (tg_real)-0.2 ? (tg_real)-0.2 : result > (tg_real)0.8 ? (tg_real)0.8 : result;
 }
 
+/* s that a row's ground speed stands for. */
+static tg_real since_ground(const tg_estimator *e, tg_real dt)
+{
+    return tgi_max(dt, e->ground.interval < e->settings.gap ? e->ground.interval : e->settings.gap);
+}
+
 /* A row whose ground speed v was measured, at the mean rim speed and adhesion; both along the travel. */
 static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, tg_real dt)
 {
@@ -59,8 +66,7 @@ static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, 
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
     m->slip += gain * (slip - m->slip);
     m->adhesion += gain * (adhesion - m->adhesion);
-    const tg_real since = tgi_max(dt, e->ground.interval < e->settings.gap ? e->ground.interval : e->settings.gap);
-    const tg_real travelled = rim * since / e->constants.mean_radius, away = slip - slip_at(k, m->usual, m->usual_adhesion, adhesion);
+    const tg_real travelled = rim * since_ground(e, dt) / e->constants.mean_radius, away = slip - slip_at(k, m->usual, m->usual_adhesion, adhesion);
     m->way = m->way + travelled < k->hill_memory ? m->way + travelled : k->hill_memory;
     const tg_real share = travelled < m->way ? travelled / m->way : 1, most = 2 * tgi_sqrt(m->apart); /* spinning wheels are not the rule */
     m->usual += share * (away > most ? most : away < -most ? -most : away);
@@ -118,14 +124,16 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
 {
     tgi_slip_memory *const m = &e->slip_memory;
     const tg_real v = e->belief.x[e->settings.machine.wheels + 1];
+    const tg_real since = since_ground(e, dt);
     tg_real rim, adhesion, variance;
     means(e, NULL, drive, &rim, &adhesion);
-    const tg_real keep = m->astray ? go_unseen(e, rim, dt) : 1;
+    const tg_real keep = m->astray ? go_unseen(e, rim, since) : 1;
     const tg_real off = tgi_square(v - reckoned_at(e, rim, adhesion, keep, tgi_square(e->settings.tuned.slip_spread) + tgi_square(m->slip / 4), &variance));
     variance += e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
-    m->agreeing = off < variance && !m->contrary ? m->agreeing + dt : 0;
+    m->agreeing = off < variance && !m->contrary ? m->agreeing + since : 0;
+    m->calm = m->unusual || m->contrary ? 0 : m->calm + since;
     if (m->contrary || (m->unusual && off > TG_BEYOND * variance)) m->astray = 1;
-    else if (m->agreeing > TG_AGREED) m->astray = 0;
+    else if (m->agreeing > TG_AGREED || m->calm > TG_CALM) m->astray = 0;
     if (!m->astray) remember(e, rim, v, adhesion, dt);
     e->scene.astray = m->astray ? off + variance : 0;
 }

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.estimation.drives import RADIUS, WHEELS, Drive, drive, robot
+from tests.estimation.drives import RADIUS, WHEELS, Drive, drive, robot, with_values
 
 from terragrip.estimation import Estimates, estimate
 from terragrip.ground.events import events
+from terragrip.recording import Recording
 
 LOST, BACK = 60.0, 130.0  # s
 
@@ -260,3 +261,23 @@ def test_a_receiver_that_reckons_without_saying_so_is_not_believed(imu: bool) ->
     assert held(wrong, made, (time > LOST + 5) & (time < BACK), "slip_fl") > 0.75
     fixed = (time < LOST) | (time > BACK + 10)
     assert np.median(wrong["slip_fl_std"][fixed]) < 1.1 * np.median(right["slip_fl_std"][fixed])
+
+
+@pytest.mark.parametrize(("rate", "every", "after", "again"), [(50.0, 10, None, 15.0), (50.0, 1, 0.45, 45.0)])
+def test_a_receiver_with_a_fix_is_believed_again(
+    rate: float, every: int, after: float | None, again: float
+) -> None:
+    """One of 5 Hz among wheels of 50 Hz was in doubt for 80 s more, and one on other ground than before for the rest of the log."""
+
+    def slip(t: Any) -> Any:
+        return np.where((after is None) | (t < BACK), soils(t), after or 0.0)
+
+    made = drive(200.0, rate=rate, slip=slip, speed=lambda t: 0.8 + 0.4 * np.sin(t / 3))
+    rare = np.arange(len(made.recording.time)) % every > 0
+
+    def estimated(log: Recording) -> Estimates:
+        return estimate(with_values(log, "ground_speed", rare, np.nan), robot())
+
+    wrong, right = estimated(dead_reckoned(made).recording), estimated(made.recording)
+    late = made.recording.time > BACK + again
+    assert np.median(wrong["slip_fl_std"][late]) < 1.1 * np.median(right["slip_fl_std"][late])

@@ -524,3 +524,15 @@ def test_what_leaps_in_either_byte_order_is_noise() -> None:
         assert not any(
             leaps(Field("x", at, 16, order, signed=True), data) for at, order in ((0, True), (7, False))
         )
+
+
+@pytest.mark.parametrize("code", [0xFFFF, 0xFFFE, 0xFF00, 0x8000, 0x7FFF])
+@pytest.mark.parametrize("little_endian", [True, False])
+def test_a_code_for_not_available_is_no_wrong_byte_order(code: int, little_endian: bool) -> None:
+    """Small values of a right DBC, and three payloads without one: the log was refused."""
+    values = np.round(120 - 120 * np.cos(np.arange(1000) / 80)).astype(int)
+    for at in (0, 250):  # where it is 0, and where it is 240
+        sent = np.r_[values[:at], [code] * 3, values[at:]]
+        data = sent.astype("<u2" if little_endian else ">u2")[:, None].view(np.uint8)
+        for signed in (True, False):
+            assert not leaps(Field("x", 0 if little_endian else 7, 16, little_endian, signed=signed), data)

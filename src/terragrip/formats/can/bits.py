@@ -12,10 +12,8 @@ from terragrip.arrays import Bools, Floats
 Bytes = npt.NDArray[np.uint8]
 
 _SHORTEST = 50  # payloads that show a byte order
-_NOISY, _SMOOTHER = (
-    0.3,
-    3.0,
-)  # mean step over mean deviation in a wrong byte order, and over that in the right one, at least
+_NOISY = 0.3  # mean step over mean deviation in a wrong byte order, at least,
+_SMOOTHER = 3.0  # and over that in the right one
 _ACROSS, _NEAR = 0.7, 0.1  # largest step over the range: in a wrong order at least, in the right one at most
 
 
@@ -78,23 +76,26 @@ def leaps(field: Field, data: Bytes) -> bool:
     """Whether a field of whole bytes leaps from payload to payload (n, bytes), and would not in the other byte order.
 
     White noise steps by 1.1 times its mean deviation, in either order. A smooth signal whose bytes are exchanged does so, too, or from
-    one end of its range to the other where its low byte begins anew.
+    one end of its range to the other where its low byte begins anew. The two least and the two greatest values do not count: codes as
+    for "not available" leap, too.
     """
     turned = 7 - field.start % 8 if field.little_endian else field.start % 8
     if field.length not in (16, 24, 32) or field.floating or turned != 7 or len(data) < _SHORTEST:
         return False
     start = 8 * (field.start // 8) + (7 if field.little_endian else 0)
     other = replace(field, start=start, little_endian=not field.little_endian)
-    (mean, most), (mean_of_other, most_of_other) = _steps(field, data), _steps(other, data)
+    values, exchanged = (physical(f, raw_of(f, data)) for f in (field, other))
+    ends = np.unique(values)[[1, -2]] if np.ptp(values) else values[:2]
+    inner = (values > ends[0]) & (values < ends[1])
+    (mean, most), (mean_of_other, most_of_other) = _steps(values[inner]), _steps(exchanged[inner])
     return mean > max(_NOISY, _SMOOTHER * mean_of_other) or (most > _ACROSS and most_of_other < _NEAR)
 
 
-def _steps(field: Field, data: Bytes) -> tuple[float, float]:
-    """From payload to payload (n, bytes), the mean step of a field over its mean deviation, and the largest over its range."""
-    values = physical(field, raw_of(field, data))
-    steps, reach = np.abs(np.diff(values)), float(np.ptp(values))
-    if not reach:
+def _steps(values: Floats) -> tuple[float, float]:
+    """From one value (n,) to the next, the mean step over the mean deviation, and the largest over the range."""
+    if len(values) < _SHORTEST or not (reach := float(np.ptp(values))):
         return 0.0, 0.0
+    steps = np.abs(np.diff(values))
     return float(steps.mean() / np.abs(values - values.mean()).mean()), float(steps.max() / reach)
 
 
