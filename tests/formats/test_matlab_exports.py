@@ -284,3 +284,24 @@ def test_a_label_for_each_instant_names_no_columns(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "log.mat", content)
     table = read_table(tmp_path / "log.mat")
     assert {"omega[0]", "omega[1]", "soil"} <= set(table.columns)
+
+
+def test_texts_beside_a_matrix_that_are_no_names_of_columns_leave_it_as_it_is(tmp_path: Path) -> None:
+    """Rims became clay and sand; and under names that are those of vectors the rims were time."""
+    pair = np.c_[SPEED, 2 * SPEED]
+    for key, texts, expected in (
+        ("soils", ["clay", "sand"], {"omega[0]", "omega[1]"}),
+        ("wheels", ["v", "t"], {"omega_v", "omega_t"}),
+    ):
+        content = {"t": TIME, "v": SPEED, "omega": pair, key: np.array(texts, dtype=object)}
+        scipy.io.savemat(tmp_path / "log.mat", content)
+        table = read_table(tmp_path / "log.mat")
+        assert set(table.columns) == {"time", "v", *expected}
+        assert np.allclose(table.columns["time"], TIME)
+
+
+def test_a_clock_of_seconds_since_a_start_a_week_ago_is_no_datenum(tmp_path: Path) -> None:
+    """At 200 Hz seconds were read as days."""
+    time = 735_000 + np.arange(400) / 200
+    scipy.io.savemat(tmp_path / "log.mat", {"t": time, "v": np.ones(400)})
+    assert np.ptp(read_table(tmp_path / "log.mat").columns["time"]) == pytest.approx(399 / 200)

@@ -90,23 +90,22 @@ def test_a_time_in_another_form_is_named(tmp_path: Path, form: str) -> None:
     )
 
 
-def test_days_of_a_spreadsheet_are_proposed_as_days_of_its_calendar(tmp_path: Path) -> None:
-    path = log(tmp_path / "a.csv", "Zeit", every=45385.4166667 + table()["Zeit"] / 86_400)
-    assert "Zeit: counts days, as a spreadsheet's dates do (45385.4 is 2024-04-03): d?" in said(path)
-    (tmp_path / "p.yaml").write_text(inspect(path).profile, encoding="utf-8")
-    recording = read(path, Profile.load(tmp_path / "p.yaml"))
-    assert recording.time[-1] == pytest.approx((ROWS - 1) / 10, abs=1e-5)
-    assert recording.to_pandas().index[0].isoformat().startswith("2024-04-03T10:00:00.00")
-
-
-def test_days_of_datenum_are_proposed_as_days_since_the_year_0(tmp_path: Path) -> None:
-    """Read as seconds: a drive of a hundredth of a second; in days, of the year 3990."""
-    path = log(tmp_path / "a.csv", "Zeit", every=739345.4166667 + table()["Zeit"] / 86_400)
-    assert "Zeit: counts days, as MATLAB's datenum does (739345 is 2024-04-03): d?" in said(path)
+@pytest.mark.parametrize(
+    ("first", "what"),
+    [
+        (45385.4166667, "a spreadsheet's dates do (45385.4 is 2024-04-03)"),
+        (739345.4166667, "MATLAB's datenum does (739345 is 2024-04-03)"),
+    ],
+)
+def test_days_are_proposed_as_those_of_a_calendar(tmp_path: Path, first: float, what: str) -> None:
+    """Datenum was read as seconds: a drive of a hundredth of a second; in days, of the year 3990."""
+    path = log(tmp_path / "a.csv", "Zeit", every=first + table()["Zeit"] / 86_400)
+    assert f"Zeit: counts days, as {what}: d?" in said(path)
     (tmp_path / "p.yaml").write_text(inspect(path).profile, encoding="utf-8")
     recording = read(path, Profile.load(tmp_path / "p.yaml"))
     assert recording.time[-1] == pytest.approx((ROWS - 1) / 10, abs=1e-4)
     assert recording.start == pytest.approx(1_712_138_400, abs=1)
+    assert recording.to_pandas().index[0].isoformat().startswith("2024-04-03T10:00:00.00")
 
 
 def test_numbers_as_texts_and_durations_are_read(tmp_path: Path) -> None:

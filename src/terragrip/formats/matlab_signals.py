@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.matlab_values import Array, Opaque, read_array, texts_of
-from terragrip.recording.columns import DATENUM_1970, DAY
+from terragrip.recording.columns import DATENUM, DATENUM_1970, DAY, DAY_STEP
 from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import LABELS, is_own
 from terragrip.units import UnitError, factor_to, is_common
@@ -33,7 +33,7 @@ _OTHER_TIMES = re.compile(
 _WIDEST = 256  # columns of a matrix that are signals: a logger's channels, no image
 _SHORTEST = 20  # rows of a matrix with its time in it: lookup tables are shorter
 _DEEPEST = 12
-_DATENUM = (600_000.0, 800_000.0)  # days since year 0: 1642 to 2190
+_HEADS = re.compile(r"name|head|label|col|var|chan|sig|wheel", re.IGNORECASE)  # a cell of names of columns
 
 
 @dataclass
@@ -119,7 +119,7 @@ def _walk_struct(struct: Mapping[str, Any], name: str, contents: Contents, depth
 
 def _with_named_columns(struct: Mapping[str, Any], contents: Contents) -> Mapping[str, Any]:
     """A struct with the columns of its matrices by the texts beside them, of which there are as many: ``data`` and ``colheaders``, as
-    importdata makes both, or any cell of names; of several matrices ``omega_fl``. A second cell, of units, gives theirs."""
+    importdata makes both, or any cell of names; of several matrices, or beside a time, ``omega_fl``. A cell of units gives theirs."""
     wide = {
         key: part
         for key, part in struct.items()
@@ -128,12 +128,11 @@ def _with_named_columns(struct: Mapping[str, Any], contents: Contents) -> Mappin
     lists = {
         key: texts
         for key, part in struct.items()
-        if key.lower() != "textdata"
-        and (texts := texts_of(part)) is not None
+        if (texts := texts_of(part)) is not None
         and any(len(texts) == min(matrix.shape) for matrix in wide.values())
     }
     stated = next((key for key, texts in lists.items() if all(map(is_common, filter(None, texts)))), "")
-    named = next((key for key in lists if key != stated), "")
+    named = next((key for key in lists if key != stated and _HEADS.search(key)), "")
     if not named:
         return struct
     heads, units = names_and_units(lists[named].tolist())
@@ -145,17 +144,20 @@ def _with_named_columns(struct: Mapping[str, Any], contents: Contents) -> Mappin
             f"Columns that occur twice are left out: {', '.join(twice)}. Rename one to use it."
         )
     own = {key: part for key, part in wide.items() if min(part.shape) == len(heads)}
+    used = {*own, named, stated}
+    rest = {key: part for key, part in struct.items() if key not in used and key.lower() != "textdata"}
+    whole = len(own) == 1 and (
+        any(head.lower() in _TIMES for head in heads) or _DATA[0] in map(str.lower, own)
+    )
     columns: dict[str, Any] = {}
     stated_units: dict[str, str] = {}
     for key, part in own.items():
         table = read_array(oriented(part, max(part.shape)))
         for k, head in enumerate(heads):
-            name = head if len(own) == 1 else f"{key}_{head}"
+            name = head if whole and head not in rest else f"{key}_{head}"
             if head not in twice:
                 columns[name] = table[:, k]
                 stated_units |= {name: units[head]} if head in units else {}
-    used = {*own, named, stated}
-    rest = {key: part for key, part in struct.items() if key not in used and key.lower() != "textdata"}
     around = _value(struct, _UNITS)
     return {**rest, **columns, "units": {**(around if isinstance(around, Mapping) else {}), **stated_units}}
 
@@ -382,7 +384,8 @@ def _is_vector(value: Any) -> bool:
 def seconds_of(clock: npt.NDArray[Any], scale: float) -> npt.NDArray[np.float64]:
     """A time vector in seconds; days since year 0, as datenum gives them, count from 1970 then."""
     time = np.asarray(clock, dtype=np.float64)
-    if len(time) and _DATENUM[0] < time[0] < _DATENUM[1] and np.median(np.abs(np.diff(time[:1000]))) < 0.01:
+    step = np.median(np.abs(np.diff(time[:1000], prepend=time[:1]))) if len(time) else 0.0
+    if len(time) and DATENUM[0] < time[0] < DATENUM[1] and step < DAY_STEP:
         return (time - DATENUM_1970) * DAY
     with np.errstate(invalid="ignore"):  # a damaged file may hold signalling NaNs
         return np.asarray(time * scale)

@@ -11,18 +11,16 @@ from terragrip.arrays import Floats
 from terragrip.formats.candidates import kind_of
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.clock import clock_unit
-from terragrip.recording.columns import DATENUM_1970, SINCE_1970, SPREADSHEET_1970
+from terragrip.recording.columns import DATENUM, DATENUM_1970, DAY_STEP, SINCE_1970, SPREADSHEET_1970
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
 _FINER = ("s", "ms", "us", "ns")
-# Until 2119 and 2190, since 1982, and the day that is 1970; or seconds of a day,
-_DAYS = {
-    "a spreadsheet's dates do": (3e4, 8e4, SPREADSHEET_1970),
-    "MATLAB's datenum does": (7.24e5, 8e5, DATENUM_1970),
+_DAYS = {  # days from, to, and the day that is 1970
+    "a spreadsheet's dates do": (3e4, 8e4, SPREADSHEET_1970),  # 1982 to 2119; or seconds of a day
+    "MATLAB's datenum does": (*DATENUM, DATENUM_1970),
 }
-_DAY_STEP = 2e-4  # whose rows are never as close: 17 s in days
 _ALONE = (("ms",), ("us",), ("ns",))
 _ROUND = 60.0
 _FIELD_RATE = 5.0  # s between samples: no log of a drive has more
@@ -123,7 +121,7 @@ def _unit(known: Floats, stated: str | None) -> tuple[str, str]:
         return unit, ""
     step = _step(known)
     for what, (low, high, at_1970) in _DAYS.items():
-        if low < np.min(known, initial=np.inf) and most < high and 0 < step < _DAY_STEP:
+        if low < np.min(known, initial=np.inf) and most < high and 0 < step < DAY_STEP:
             day = np.datetime64("1970-01-01") + np.timedelta64(int(known[0]) - at_1970, "D")
             return "d", f"counts days, as {what} ({known[0]:.6g} is {day}): d?"
     unit = next((u for u in _FINER if step * factor_to(u, "s") < _FIELD_RATE), "s")

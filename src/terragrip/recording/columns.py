@@ -46,6 +46,10 @@ SPREADSHEET_1970 = 25569
 """Days of a spreadsheet's dates, which count from 1899-12-30, until 1970."""
 DATENUM_1970 = 719529
 """Days of MATLAB's datenum, which counts from the year 0, until 1970."""
+DATENUM = (7.24e5, 8e5)
+"""Days that are read as such a date: 1982 to 2190,"""
+DAY_STEP = 2e-4
+"""if rows are as close (17 s): those of a clock in seconds never are."""
 
 
 def start_of(stamps: npt.NDArray[Any], time: Floats) -> float | None:
