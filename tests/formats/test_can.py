@@ -498,11 +498,21 @@ def test_a_message_on_two_buses_is_two_signals(tmp_path: Path, suffix: str) -> N
     read = read_log(log, databases=(str(dbc),))
     assert np.allclose(read.signals["speed"].values, SENT, atol=0.006)
     assert not read.signals["speed@bus1"].values.any()
-    assert any("speed has several senders; it is taken from bus 0" in note for note in read.notes)
+    assert any("speed has several senders; that of bus 0 is used" in note for note in read.notes)
 
 
-def test_a_message_on_one_bus_has_no_second_name(tmp_path: Path) -> None:
-    log, dbc = _sent(tmp_path)
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
+def test_one_buss_signal_is_read_by_its_name(tmp_path: Path, suffix: str) -> None:
+    """Of an ASC log nothing was."""
+    log, dbc = _sent(tmp_path, second_bus=True, suffix=suffix)
+    read = read_log(log, lambda name: name == "speed@bus1", (str(dbc),))
+    assert len(read.signals["speed@bus1"].values) == len(SENT)
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log", "trc"])
+def test_a_message_on_one_bus_has_no_second_name(tmp_path: Path, suffix: str) -> None:
+    """Of an ASC log it was one of 'several senders', speed@bus-1 the other."""
+    log, dbc = _sent(tmp_path, suffix=suffix)
     read = read_log(log, databases=(str(dbc),))
     assert set(read.names) == {"speed", "torque"}
     assert not read.notes

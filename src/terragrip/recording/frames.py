@@ -18,6 +18,8 @@ from terragrip.units import UnitError, factor_to, is_common
 
 WITH_UNIT = re.compile(r"(.+?)\s*(?:\[\s*([^\]]*?)\s*\]|\(\s*([^)]*?)\s*\))$")
 
+_EMPTY = re.compile(r"|nan|Unnamed: \d+_level_\d+")  # levels without a name, as pandas makes and reads them
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -173,7 +175,7 @@ def columns_of(frame: Any, source: str | None) -> dict[str, npt.NDArray[Any]]:
 
 def of_levels(levels: Iterable[Any]) -> str:
     """The name of a column of several levels in one: ``wheel_speed_fl`` of ``("wheel_speed", "fl")``."""
-    return "_".join(str(level) for level in levels if level != "")
+    return "_".join(text for text in map(str, levels) if not _EMPTY.fullmatch(text))
 
 
 def names_and_units(header: list[str]) -> tuple[tuple[str, ...], dict[str, str]]:

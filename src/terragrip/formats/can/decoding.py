@@ -38,9 +38,8 @@ def signals_of(frames: Frames) -> tuple[dict[str, Signal], list[str]]:
     """
     frames.flush()
     result: dict[str, Signal] = {}
-    best: dict[
-        str, tuple[int, int, int]
-    ] = {}  # plain name: valid samples, what prefers low addresses and buses, the sender
+    # Plain name: valid samples, what prefers low addresses and buses, the sender.
+    best: dict[str, tuple[int, int, int]] = {}
     several: set[str] = set()
     for (name, sender), kept in frames.kept.items():
         if not kept:  # its lines could not be read
@@ -79,7 +78,7 @@ def _decoded(frames: Frames, message: Message, sender: int, kept: list[Block]) -
 
 def _on_senders(best: dict[str, tuple[int, int, int]], several: set[str]) -> list[str]:
     return [
-        f"{name} has several senders; it is taken from {place_of(best[name][2])}, which has the most valid samples."
+        f"{name} has several senders; that of {place_of(best[name][2])} is used, which has the most valid samples."
         for name in sorted(several)
     ]
 

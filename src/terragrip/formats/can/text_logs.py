@@ -234,11 +234,11 @@ def _asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Itera
             now += float(cells[0])
             line = f"{now:.6f} {line.lstrip().partition(' ')[2]}"
         if len(cells) == 4 and cells[1].isdigit() and cells[3].startswith(("Rx", "Tx")):
-            name = cells[2]
+            name = f"{cells[1]} {cells[2]}"
             if frames.leaves_out_next():
                 continue
             if name not in unwanted:
-                identifier = _asc_identifier(name, base)
+                identifier = _asc_identifier(cells[2], int(cells[1]) - 1, base)
                 is_unwanted = identifier is not None and frames.are_unwanted(identifier)
                 unwanted[name] = identifier if is_unwanted else None
             elif (known := unwanted[name]) is not None:
@@ -247,9 +247,10 @@ def _asc_lines(lines: Iterable[Numbered], frames: Frames, count: Count) -> Itera
         yield number, line
 
 
-def _asc_identifier(text: str, base: int) -> int | None:
+def _asc_identifier(text: str, bus: int, base: int) -> int | None:
     try:
-        return _checked(int(text[:-1], base)) | EXTENDED if text[-1] in "xX" else _checked(int(text, base))
+        wide = text[-1] in "xX"
+        return on_bus(_checked(int(text[:-1] if wide else text, base)) | EXTENDED * wide, bus)
     except ValueError:
         return None
 
