@@ -132,7 +132,9 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     variance += e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
     m->agreeing = off < variance && !m->contrary ? m->agreeing + since : 0;
     m->calm = m->unusual || m->contrary ? 0 : m->calm + since;
-    if (m->contrary || (m->unusual && off > TG_BEYOND * variance)) m->astray = 1;
+    const int32_t before = m->against > 0; /* one reading may be a spike */
+    m->against = m->contrary || (m->unusual && off > TG_BEYOND * variance);
+    if (m->against && before) m->astray = 1;
     else if (m->agreeing > TG_AGREED || m->calm > TG_CALM) m->astray = 0;
     if (!m->astray) remember(e, rim, v, adhesion, dt);
     e->scene.astray = m->astray ? off + variance : 0;

@@ -29,7 +29,8 @@ typedef struct { /* low-passed while the ground speed is measured; the whole veh
     tg_real unseen;                /* wheel radii since a ground speed was measured, or believed */
     tg_real drawn, draws;          /* m/s by which ground speeds drew the estimate from its forecast lately; mean square */
     tg_real unusual, contrary;     /* 1: they do so more than is usual; all slips have another sign than adhesions */
-    tg_real astray, agreeing;      /* 1: they contradict forces and wheels; s since when they do not, */
+    tg_real against;               /* 1: the last reading contradicted forces and wheels, */
+    tg_real astray, agreeing;      /* and 1: readings do; s since when they do not, */
     tg_real calm;                  /* and since neither of the two signs above does */
 } tgi_slip_memory;
 
