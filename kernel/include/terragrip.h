@@ -318,7 +318,6 @@ typedef struct {
     tg_real increment_memory;       /* s: of the usual increments */
     tg_real input_lag;              /* s, at most: low-pass of measured loads, pitch, and the pull as the loads feel it */
     tg_real unknown_slope;          /* rad: SD of a pitch never measured or long silent */
-    tg_real wheel_late;             /* intervals after which a wheel's last sample is no longer used */
     tg_real mounting_walk;          /* rad^2, gained in T: of the slope that a pitch sensor does not show */
     tg_real terrain_walk;           /* rad^2, gained on a wheel radius of way: of the whole slope, where there is none */
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */

@@ -19,12 +19,12 @@ void tgi_reset_slips(tg_estimator *e)
 
 /* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. A wheel that
  * is silent itself says nothing of the ground speed, unless all are: its belief follows from the ground speed. What a turn adds to the rim
- * is taken off: the wheels that are heard may be those of one side. */
+ * is taken off: the wheels that are measured may be those of one side. */
 static void means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
 {
     const int32_t n = e->settings.machine.wheels;
     tg_real load = 0, pull = 0, speed = 0, believed = 0;
-    int32_t heard = 0;
+    int32_t counted = 0;
     for (int32_t i = 0; i < n; i++) {
         load += drive->load[i];
         pull += drive->load[i] * e->belief.x[i];
@@ -34,9 +34,9 @@ static void means(const tg_estimator *e, const tg_row *row, const tg_drive *driv
         const tg_real middle = e->settings.rolling_radius[i] * omega + (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
         speed += counts ? middle : 0;
         believed += middle;
-        heard += counts;
+        counted += counts;
     }
-    *rim = heard ? speed / (tg_real)heard : believed / (tg_real)n;
+    *rim = counted ? speed / (tg_real)counted : believed / (tg_real)n;
     *adhesion = pull / load;
 }
 
@@ -91,7 +91,7 @@ static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion,
     return rim * (1 - usual - keep * (last - usual));
 }
 
-/* Take the innovation of a ground speed, its variance, and the gain. */
+/* After a ground speed: its innovation, the variance of that, and the gain. */
 void tgi_watch_draw(tg_estimator *e, tg_real innovation, tg_real variance, tg_real gain)
 {
     tgi_slip_memory *const m = &e->slip_memory;
@@ -111,7 +111,8 @@ void tgi_watch_signs(tg_estimator *e, const tg_real *o)
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], slip = o[TG_OUT_SLIP + i], mu = o[TG_OUT_ADHESION + i];
-        const tg_real apart = speed / tgi_square(tgi_max(tgi_fabs(rim), s->standstill_speed)) + tgi_square(s->uncertainty.wheel_radius);
+        const tg_real speeds = speed + tgi_square(s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED_STD + i]);
+        const tg_real apart = speeds / tgi_square(tgi_max(tgi_fabs(rim), s->standstill_speed)) + tgi_square(s->uncertainty.wheel_radius);
         if (!(slip * mu < 0 && tgi_square(slip) > TG_BEYOND * apart && tgi_square(mu) > TG_BEYOND * tgi_square(o[TG_OUT_ADHESION_STD + i]))) return;
     }
     e->slip_memory.contrary = 1;

@@ -37,7 +37,6 @@ static tg_tuned default_tuned(void)
     k.increment_memory = 1;
     k.input_lag = (tg_real)0.07;
     k.unknown_slope = (tg_real)0.1;
-    k.wheel_late = (tg_real)1.5;
     k.mounting_walk = (tg_real)7e-8;
     k.terrain_walk = (tg_real)8e-5;
     k.silence = (tg_real)0.5;

@@ -22,7 +22,7 @@ static void keep_steady(const tg_estimator *e, int32_t i, tg_real age, tg_row *r
     row->steady_wheels |= 1 << i;
 }
 
-/* After the row's inputs: by how much time each wheel moves in this row. One whose sample is late waits no longer, and goes on from there. */
+/* After the row's inputs: by how much time each wheel moves in this row. */
 void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
 {
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
@@ -30,12 +30,11 @@ void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
         tgi_own_time *const p = &e->turned[i];
         const tg_real age = (tg_real)(row->time - h->time);
         const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
-        const tg_real usual = tgi_max(h->interval, e->settings.held_period[TG_WHEEL_SPEED + i]);
-        const int32_t between = goes && missing && h->count > 1 && age <= e->settings.tuned.wheel_late * usual;
+        const int32_t between = goes && missing && h->count > 1;
         const int32_t steady = between && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
         const int32_t waits = between && !steady;
         e->scene.since_sample[i] = waits ? moved_since(e, i, age) : 0;
-        const double from = goes && (steady || !missing) ? p->until : e->time;
+        const double from = goes ? p->until : e->time;
         if (steady) keep_steady(e, i, age, row);
         p->step = waits ? 0 : e->started ? (tg_real)(row->time - from) : 0;
         e->filter.moves[i] = dt > 0 ? p->step / dt : 1;
