@@ -195,7 +195,7 @@ static void brake_noise(const tg_estimator *e, const tg_row *row, tg_real dt, tg
     const tg_real share = row->missed_braking > 0 ? 1 : dt / (tg_real)TG_BRAKE_TIME;
     q[2 * n + 1] += row->missed_braking;
     for (int32_t i = 0; i < n; i++) {
-        q[i] += 2 * e->settings.gap * e->turned[i].step * e->constants.unknown_torque[i] * tgi_square(e->filter.inverse_inertia[i]);
+        q[i] += 2 * e->settings.gap * e->own_time[i].step * e->constants.unknown_torque[i] * tgi_square(e->filter.inverse_inertia[i]);
         q[n + 1 + i] += tgi_square(e->settings.prior_adhesion_std) * share;
     }
 }
@@ -238,11 +238,11 @@ void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, t
     q[2 * n + 1] = hills * dt;
     for (int32_t i = 0; i < n; i++) {
         row->chatter[i] = chatter(&e->wheel[i], s->noise[TG_WHEEL_SPEED + i]);
-        if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * e->turned[i].step / e->wheel[i].interval;
+        if (row->chatter[i] > 0 && e->wheel[i].count > TG_LEAST_SAMPLES) q[i] = row->chatter[i] * e->own_time[i].step / e->wheel[i].interval;
     }
     for (int32_t i = 0; i < n; i++)
         if (s->driven[i])
-            q[i] += held_noise(e, &e->torque[i], time, e->turned[i].step, (tg_real)(time - e->turned[i].torque), s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
+            q[i] += held_noise(e, &e->torque[i], time, e->own_time[i].step, (tg_real)(time - e->own_time[i].torque), s->noise[TG_DRIVE_TORQUE + i], c->unknown_torque[i])
                  * tgi_square(e->filter.inverse_inertia[i]);
     if (e->drawbar.count > 0 || s->towing)
         q[n] += held_noise(e, &e->drawbar, time, dt, (tg_real)(time - e->drawbar.since), s->noise[TG_DRAWBAR_FORCE], c->unknown_pull) * tgi_square(drive->inverse_mass);

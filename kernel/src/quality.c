@@ -173,8 +173,8 @@ static tg_real possible_rate(const tg_estimator *e, const tg_row *row, int32_t s
 }
 
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle
- * is capable of is no spike, except of the ground speed where the estimate does not expect it; after a gap, of most wheels together. A jump
- * of the accelerometer, which the slope and the loads would keep, is left out until then. */
+ * is capable of is no spike, unless nothing explains it (possible_rate); after a gap, of most wheels together. A jump of the accelerometer,
+ * which the slope and the loads would keep, is left out until then. */
 void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
 {
     const tg_real *const rate = e->constants.agility;

@@ -27,7 +27,7 @@ void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
 {
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) {
         const tg_hold *const h = &e->wheel[i], *const torque = &e->torque[i];
-        tgi_own_time *const p = &e->turned[i];
+        tgi_own_time *const p = &e->own_time[i];
         const tg_real age = (tg_real)(row->time - h->time);
         const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
         const int32_t between = goes && missing && h->count > 1;
