@@ -546,3 +546,24 @@ def test_a_code_for_not_available_is_no_wrong_byte_order(code: int, little_endia
         data = sent.astype("<u2" if little_endian else ">u2")[:, None].view(np.uint8)
         for signed in (True, False):
             assert not leaps(Field("x", 0 if little_endian else 7, 16, little_endian, signed=signed), data)
+
+
+@pytest.mark.parametrize("names", [("left", "right"), ("can0", "vcan0"), ("canB", "can0")])
+@pytest.mark.parametrize("form", ["candump", "table"])
+def test_two_buses_without_numbers_of_their_own_are_two(
+    tmp_path: Path, names: tuple[str, str], form: str
+) -> None:
+    """`left` and `right` were one bus, and their controllers one signal that jumped; so were can0 and vcan0."""
+    (tmp_path / "machine.dbc").write_text(BUSES.format(at=(0, 16), order=1))
+    lines = ["time,bus,id,data"] if form == "table" else []
+    for k, speed in enumerate(SENT):
+        data = struct.pack("<hhxxxx", round(100 * speed), 0).hex()
+        for bus, shown in zip(names, (data, bytes(8).hex()), strict=True):
+            stamp = f"{START + 0.02 * k:.6f}"
+            lines.append(f"{stamp},{bus},100,{shown}" if form == "table" else f"({stamp}) {bus} 100#{shown}")
+    log = tmp_path / ("log.csv" if form == "table" else "log.log")
+    log.write_text("\n".join(lines) + "\n")
+    read = read_log(log, databases=(str(tmp_path / "machine.dbc"),))
+    speeds = [read.signals[name].values for name in read.names if name.startswith("speed@")]
+    assert sorted(float(values.max()) for values in speeds) == [0.0, pytest.approx(SENT.max(), abs=0.006)]
+    assert any(f"{names[0]} is bus " in note for note in read.notes)

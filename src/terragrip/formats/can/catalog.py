@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -52,6 +53,17 @@ def source_of(identifier: int) -> int:
 def on_bus(identifier: int, bus: object) -> int:
     """An identifier with its frame's bus, as the log numbers it; as it is where there is no number."""
     return identifier | (bus + 1) << _BUS if isinstance(bus, int) and 0 <= bus < _MOST_BUSES else identifier
+
+
+def bus_of(name: str, known: dict[str, int]) -> int | None:
+    """The number of a bus by its name in a log, None where it has none: the one at its end, else, or where another bus of the log has
+    that, the next free one. ``known``: those met so far, to which it is added."""
+    if name and name not in known:
+        number = re.search(r"\d{1,4}$", name)
+        own = int(number[0]) if number else None
+        free = next(k for k in range(len(known) + 1) if k not in known.values())
+        known[name] = free if own is None or own in known.values() else own
+    return known.get(name)
 
 
 def with_buses(identifiers: Ints, buses: npt.NDArray[Any]) -> Ints:

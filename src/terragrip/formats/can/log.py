@@ -153,6 +153,8 @@ def _on_lines(count: Count, good: int, kind: str, path: str) -> list[str]:
     if count.bad:
         what = "1 line has no frame:" if count.bad == 1 else f"{count.bad} lines have no frame, the first is"
         notes.append(f"{what} {place}; left out.")
+    if any(not name.endswith(str(number)) for name, number in count.buses.items()) and len(count.buses) > 1:
+        notes.append(f"Buses: {', '.join(f'{name} is bus {k}' for name, k in count.buses.items())}.")
     if count.begun:
         notes.append(
             "The log has no 'End TriggerBlock': it was cut, or its logger was, and the drive may have gone on."

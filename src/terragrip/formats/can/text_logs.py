@@ -8,18 +8,18 @@ import io
 import itertools
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
 from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.can.catalog import EXTENDED, on_bus
+from terragrip.formats.can.catalog import EXTENDED, bus_of, on_bus
 from terragrip.formats.can.frames import Frame, Frames
 
 Numbered = tuple[int, str]
 """A line's number, and the line."""
 
-_TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+\S*?(\d*)\s+"  # and the interface's number
+_TIME = r"\s*\((\d+\.\d+|\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d+)\)\s+(\S+)\s+"  # and the interface
 # (1600000000.000000) can0 18FE4800#0000030405060708 R
 _COMPACT = re.compile(
     _TIME + r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#(?:#[0-9A-Fa-f])?([0-9A-Fa-f]*)(?:\s+[RT])?\s*$"
@@ -88,13 +88,14 @@ def lines_are_like(head: bytes, *forms: re.Pattern[str]) -> bool:
 @dataclass
 class Count:
     """How many lines of a text log held no frame and were no known remark, and the first of them; ``begun``: a measurement has begun
-    and not ended."""
+    and not ended; ``buses``: the number of each bus by its name."""
 
     bad: int = 0
     first: int = 0
     shown: str = ""
     unstamped: bool = False
     begun: bool = False
+    buses: dict[str, int] = field(default_factory=dict)
 
     def add(self, number: int, line: str) -> None:
         """Count a line."""
@@ -142,7 +143,7 @@ def _candump(lines: Iterable[Numbered], count: Count, frames: Frames | None) -> 
                 count.unstamped = count.unstamped or bool(_UNSTAMPED.match(line))
             continue
         identifier = int(match[3], 16) | (EXTENDED if len(match[3]) == _EIGHT else 0)
-        identifier = on_bus(identifier, int(match[2]) if match[2] else None)
+        identifier = on_bus(identifier, bus_of(match[2], count.buses))
         # Only log files, whose lines have no blanks in the payload, are of the size that makes this worth while.
         if frames is not None and mark > 0 and frames.are_unwanted(identifier):
             unwanted[head] = identifier
@@ -272,7 +273,7 @@ def table(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]
             (time, scale), *_ = ((row[name], _TIMES[name]) for name in names if name in _TIMES)
             payload = _payload(next(row[name] for name in names if name in _DATA))
             bus = next((row[name].strip() for name in _BUSES if name in row), "")
-            identifier = on_bus(_identifier(row), int(bus) if bus.isdecimal() else None)
+            identifier = on_bus(_identifier(row), bus_of(bus, count.buses))
             yield scale * float(time.replace(",", ".")), identifier, payload
         except (ValueError, binascii.Error):
             count.add(number, line)
