@@ -461,6 +461,16 @@ def test_the_efforts_of_a_joint_state_are_torques_and_a_profile_that_fits_says_w
     assert "twist.twist.linear.x" in text
 
 
+def test_an_effort_that_states_no_unit_may_be_a_current() -> None:
+    """In a log without a drawbar force nothing contradicts a driver's amperes: they were newton metres, without a question mark."""
+    columns = {"/joint_states.velocity.front_left_wheel": 10 * SPEED, "/gps.speed [m/s]": SPEED}
+    effort = 5 + np.sin(TIME)
+    bare = _propose(columns | {"/joint_states.effort.front_left_wheel": effort})["drive_torque_fl"]
+    assert bare.doubt == "no unit is stated: N m, or a current, as many drivers give it?"
+    stated = _propose(columns | {"/joint_states.effort.front_left_wheel [N m]": effort})["drive_torque_fl"]
+    assert not stated.doubt
+
+
 @pytest.mark.parametrize(
     ("name", "channel"), [("Zugkraft {} [kN]", "drawbar_force"), ("hitch vertical {} [kN]", "hitch_load")]
 )

@@ -26,9 +26,8 @@ _ROS = (
     (r"\.wrench\.force\.[xyz]$", "N"),
     (r"\.twist\.linear\.[xyz]$", "m/s"),
     (r"\.velocity(\d|\.)|joint.*\.velocity$", "rad/s"),
-    (r"\.effort(\d|\.)|joint.*\.effort$", "N m"),
 )
-"""Fields of ROS's own message types, by the end of their path, and their units (REP 103)."""
+"""Fields of ROS's own message types, by the end of their path, and their units (REP 103). No efforts: many drivers give currents."""
 
 
 @dataclass(frozen=True)

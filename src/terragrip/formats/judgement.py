@@ -152,7 +152,8 @@ class Judge:
             return replace(guess, unit="rad/s", unit_doubt=f"reaches {size:.3g}: rpm or deg/s?")
         if target == "rad/s" and guess.channel.startswith("angular") and size > 12:
             return replace(guess, unit="deg/s", evidence=(guess.why, "its magnitude suggests deg/s"))
-        return replace(guess, unit=target, unit_doubt=f"no unit is stated: {target}?")
+        effort = ", or a current, as many drivers give it" if "effort" in guess.column.name.words else ""
+        return replace(guess, unit=target, unit_doubt=f"no unit is stated: {target}{effort}?")
 
 
 def varies(values: Floats) -> bool:
