@@ -49,6 +49,7 @@ PAGES = (
     ("neither the motion nor another force answers", "checks#a-part-of-the-drive"),
     (": its scale changed, and", "checks#a-part-of-the-drive"),
     ("in all rows, which no cell reads", "checks#channels-that-are-dead-held-or-cut"),
+    ("no ground pushes a vehicle", "checks#units-scales-and-zeros"),
     ("the zero of drawbar_force drifts", "checks#a-part-of-the-drive"),
     ("is by its name the torque of an axle", "vehicle#signals-that-are-missing"),
     ("pull, which no wheel that pulls does:", "checks#a-part-of-the-drive"),

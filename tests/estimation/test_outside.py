@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+import yaml
 
-from terragrip.estimation import Estimates, estimate
+from terragrip.estimation import Estimates, estimate, estimated
 from terragrip.estimation.engine import EVENTS
 from terragrip.estimation.summary import Tally
-from terragrip.recording import Recording
+from terragrip.recording import LogBlocks, Recording
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -306,3 +307,25 @@ def test_a_caster_without_a_drive_has_a_bearing_resistance_of_its_own() -> None:
     estimates = estimate(Recording.from_frame(columns), cart)
     assert float(estimates["adhesion_c"][-1]) == pytest.approx(0, abs=0.005)
     assert float(estimates["soil_resistance"][-1]) == pytest.approx(0.04, abs=0.005)
+
+
+@pytest.mark.parametrize("wrong", ["friction taken off", "pull's zero"])
+def test_a_ground_that_would_push_is_named(wrong: str) -> None:
+    """What a driver takes off for friction, or a drawbar force's zero, made soil resistance -.02 ± .01 without a word; right logs have no
+    such note, and a log in blocks has it once."""
+    right = robot(rate=20.0)
+    level = {"pitch": 1e-3 * np.random.default_rng(2).standard_normal(len(right.recording))}
+    vehicle = Vehicle.from_dict(yaml.safe_load(right.vehicle.to_yaml()) | {"uncertainty": {"slope": 0.003}})
+    weight = right.vehicle.mass * G
+    off = {
+        "friction taken off": ("drive_torque_", -0.08 * weight * 0.2 / 4),
+        "pull's zero": ("drawbar_force", 0.08 * weight),
+    }
+    begins, by = off[wrong]
+    sound = right.recording.with_channels(**level)
+    log = replace(sound, channels={n: v + by * n.startswith(begins) for n, v in sound.channels.items()})
+    (named,) = estimate(log, vehicle).notes
+    assert "no ground pushes a vehicle" in named
+    assert not estimate(sound, vehicle).notes
+    parts = list(estimated(LogBlocks.of(log, 500), vehicle))
+    assert [named in part.notes for part in parts] == [False] * (len(parts) - 1) + [True]

@@ -14,7 +14,7 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.forward import carried_channels, flag_before_gaps, run
 from terragrip.estimation.methods import DEFAULT, method_named
-from terragrip.estimation.provenance import notes_of
+from terragrip.estimation.provenance import notes_of, with_push_note
 from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
@@ -99,17 +99,30 @@ def estimated(
     """
     options = options or RunOptions()
     require_vehicle(vehicle)
+    yield from with_push_note(_estimated(log, vehicle, options, beside, planned, progress, together))
+
+
+def _estimated(
+    log: LogBlocks,
+    vehicle: Vehicle,
+    options: RunOptions,
+    beside: str | os.PathLike[str] | None,
+    planned: Callable[[int, tuple[str, ...]], None] | None,
+    progress: Progress | None,
+    together: int,
+) -> Iterator[Estimates]:
+    """`estimated`, of a log of any kind."""
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
         driven = ByEngine(whole, vehicle)
         yield from driven.completed(
-            estimated(
+            _estimated(
                 driven.log(log),
                 driven.machine.vehicle,
                 options,
-                beside=beside,
-                planned=planned,
-                progress=progress,
-                together=driven.machine.together,
+                beside,
+                planned,
+                progress,
+                driven.machine.together,
             )
         )
         return

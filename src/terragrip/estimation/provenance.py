@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from terragrip.errors import InputError
+from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.methods import SLIP_ONLY
 from terragrip.recording import unit_warnings
 from terragrip.recording.brake import braked
@@ -16,8 +19,12 @@ from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.recording.clock import clock_text
 
 if TYPE_CHECKING:
+    from terragrip.estimation.estimates import Estimates
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
+
+_PUSHED = 0.05  # of the rows without an event: twice what 95 % intervals may miss on one side
+_FEWEST = 20  # rows
 
 
 def about_recording(recording: Recording) -> dict[str, Any]:
@@ -111,3 +118,25 @@ def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, .
     if estimator.slip_reference is not None:
         notes += estimator.slip_reference.notes
     return tuple(dict.fromkeys(notes))
+
+
+def with_push_note(parts: Iterator[Estimates]) -> Iterator[Estimates]:
+    """The parts of a log's estimates, the last with a sentence where the intervals of soil resistance are below 0 too often: no ground
+    pushes a vehicle."""
+    below = rows = 0
+    last: Estimates | None = None
+    for part in parts:
+        if last is not None:
+            yield last
+        last = part
+        if "soil_resistance" in part:
+            free = part["soil_resistance"] + NORMAL_95 * part["soil_resistance_std"]
+            free = free[(part.event_codes == 0) & np.isfinite(free)]
+            below, rows = below + int(np.sum(free < 0)), rows + len(free)
+    if last is not None:
+        share = f"{below / max(rows, 1):.0%} of the rows without an event"
+        note = (
+            f"soil_resistance and its interval are below 0 in {share}, but no ground pushes a vehicle: check the torques (scale, zero, "
+            "what a driver takes off for friction), drawbar_force and the mass; a slope downhill that nothing measures does this, too."
+        )
+        yield replace(last, notes=(*last.notes, note)) if below >= max(_FEWEST, _PUSHED * rows) else last
