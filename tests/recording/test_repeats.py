@@ -72,6 +72,35 @@ def test_a_row_for_each_message_makes_one_row() -> None:
     assert [n for n in found.notes if "repeat" in n] == [f"400 {NOTE}"]
 
 
+@pytest.mark.parametrize("size", [1, 50, 1000])
+def test_messages_that_come_late_by_a_row_are_sorted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """Two messages of a CAN or ROS logger in the wrong order: refused with 'time goes back', whole and in blocks."""
+    monkeypatch.setattr(parquet, "ROWS", size)
+    frame, path = log(), tmp_path / "log.parquet"
+    order = np.arange(len(frame))
+    for row in (0, 49, 200, 398):
+        order[[row, row + 1]] = row + 1, row
+    swapped = frame.iloc[order].reset_index(drop=True)
+    swapped.to_parquet(path, row_group_size=70)
+    blocks = list(recordings_of(parquet.parquet_on_disk(str(path)), PLAIN) or ())
+    right = PLAIN.apply(frame).to_pandas()
+    for found in (PLAIN.apply(swapped).to_pandas(), pd.concat([b.to_pandas() for b in blocks])):
+        pandas.testing.assert_frame_equal(found.reset_index(drop=True), right.reset_index(drop=True))
+    assert (
+        "4 rows stand behind rows of later stamps, by 3 places at most: sorted by time."
+        in PLAIN.apply(swapped).notes
+    )
+
+
+def test_a_clock_that_was_set_back_is_no_message_that_comes_late() -> None:
+    frame = log()
+    frame.loc[200:, "t"] -= 0.09
+    with pytest.raises(InputError, match="time goes back"):
+        PLAIN.apply(frame)
+
+
 def test_labels_that_differ_in_blanks_alone_are_one() -> None:
     columns = {"t": np.array([0.0, 0.0, 1.0]), "field": np.array(["a", " a ", "b"], dtype=object)}
     kept, repeats = merged(columns, "t")

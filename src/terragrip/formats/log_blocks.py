@@ -20,7 +20,7 @@ from terragrip.formats.time_base import first_start
 from terragrip.recording import LogBlocks, Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
-from terragrip.recording.repeats import Repeats, merged
+from terragrip.recording.repeats import LATE, Repeats, merged
 from terragrip.recording.schema import TIME, is_own
 from terragrip.recording.survey import ROWS
 
@@ -111,12 +111,12 @@ def _one_row_an_instant(log: TableOnDisk, blocks: Iterator[Columns], column: str
 
 
 def _whole_instants(blocks: Iterator[Columns], column: str) -> Iterator[Columns]:
-    """The blocks cut so that no run of equal stamps in ``column`` is in two of them."""
+    """The blocks cut so that no run of equal stamps in ``column`` is in two of them, nor a row and those that it should precede."""
     held: Columns = {}
     for block in blocks:
         before, stamps = held.get(column, block[column][:0]), block[column]
-        if len(before) and len(stamps) and stamps[0] == before[-1]:
-            other = np.flatnonzero(before != before[-1])
+        if len(before) and len(stamps) and (first := stamps[: LATE + 1].min()) <= before[-1]:
+            other = np.flatnonzero(before < first)
             cut = int(other[-1]) + 1 if len(other) else 0
             block = {name: np.concatenate([held[name][cut:], values]) for name, values in block.items()}
             held = {name: values[:cut] for name, values in held.items()}

@@ -1,4 +1,4 @@
-"""Rows of a log with one and the same stamp: a logger that writes twice, or a row for each message."""
+"""Rows of a log with one and the same stamp, or a place late: a logger that writes twice, or a row for each message."""
 
 from __future__ import annotations
 
@@ -13,36 +13,44 @@ from terragrip.arrays import Bools
 from terragrip.recording.columns import label_of
 
 Column = npt.NDArray[Any]
+LATE = 3
+"""Places by which a message may come after later ones. A clock that was set back moves more rows, and is refused."""
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """How many rows repeat the stamp before them: ``merged`` with it, or ``other``, left as they are because values differ."""
+    """How many rows repeat the stamp before them: ``merged`` with it, or ``other``, left as they are because values differ; and how
+    many were ``late``, after rows of later stamps.
+    """
 
     merged: int = 0
     other: int = 0
+    late: int = 0
 
     def __add__(self, more: Repeats) -> Repeats:
-        return Repeats(self.merged + more.merged, self.other + more.other)
+        return Repeats(self.merged + more.merged, self.other + more.other, self.late + more.late)
 
     def notes(self) -> list[str]:
-        """One sentence for the user, or none."""
-        if not self.merged:
-            return []
+        """A sentence for the user on each."""
         counted = "1 row repeats" if self.merged == 1 else f"{self.merged} rows repeat"
-        return [f"{counted} the time of the row before without another value: merged with it."]
+        late = "1 row stands" if self.late == 1 else f"{self.late} rows stand"
+        sentences = [f"{counted} the time of the row before without another value: merged with it."]
+        return sentences * (self.merged > 0) + [
+            f"{late} behind rows of later stamps, by {LATE} places at most: sorted by time."
+        ] * (self.late > 0)
 
 
 def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column], Repeats]:
     """Columns (n,) with one row for each run of equal stamps in the column ``stamp`` whose values do not differ, and the repeats.
 
-    A value missing in one row of a run is filled from the others: a logger writes a row for each message, or writes twice.
+    Rows that stand up to `LATE` places too late are sorted before. A value missing in one row of a run is filled from the others: a logger writes a row for each message, or writes twice.
     A run with two different values in a column is left as it is, for the recording to refuse: nothing shows which was measured when.
     """
+    columns, late = _in_order(columns, stamp)
     stamps = columns[stamp]
     again = np.r_[False, stamps[1:] == stamps[:-1]]
     if not again.any():
-        return dict(columns), Repeats()
+        return dict(columns), Repeats(late=late)
     rows, starts = np.arange(len(stamps)), np.flatnonzero(~again)
     run = np.cumsum(~again) - 1
     differs, filled = np.zeros(len(starts), dtype=bool), {}
@@ -56,7 +64,19 @@ def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column]
         name: column[np.where(differs[run], rows, filled[name][run])[kept]]
         for name, column in columns.items()
     }
-    return result, Repeats(len(stamps) - int(kept.sum()), int((again & differs[run]).sum()))
+    return result, Repeats(len(stamps) - int(kept.sum()), int((again & differs[run]).sum()), late)
+
+
+def _in_order(columns: Mapping[str, Column], stamp: str) -> tuple[Mapping[str, Column], int]:
+    """Columns (n,) sorted by stamp where no row stands more than `LATE` places from its own, and how many stood behind it."""
+    stamps = columns[stamp]
+    if stamps.dtype.kind not in "fiuM" or not (stamps[1:] < stamps[:-1]).any():
+        return columns, 0
+    order = np.argsort(stamps, kind="stable")
+    moved = order - np.arange(len(order))
+    if np.abs(moved).max() > LATE:
+        return columns, 0
+    return {name: column[order] for name, column in columns.items()}, int((moved > 0).sum())
 
 
 def _known(column: Column) -> Bools:
