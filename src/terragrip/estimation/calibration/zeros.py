@@ -27,6 +27,7 @@ _DRIVING = 0.1  # m/s
 _LEAST_FREE = 10.0  # s of driving with a bar that nothing moves
 _UNKNOWN_YAW = 0.005  # rad/s, prior of a gyroscope's zero where the vehicle never stands: .3 deg/s
 _ALIKE = 3.0  # standard errors
+_HILL = 20.0  # m: stops nearer than that stand on one slope
 _ALONE = 4.0  # s that one stop must last to count without another that agrees: whoever stands for the zeros stands 10 s
 _ONE_SHORT_STOP = "one short stop, or stops that disagree: stand 10 s with the motors off and the bar slack, or twice with driving between"
 # Of the weight along the slope: wheels that hold the vehicle carry it, less what the ground's resistance does.
@@ -314,12 +315,17 @@ def inclination_zeros(
     )
     stated = vehicle.uncertainty
     rests_on = evidence(windows, rows_of(stops), sources, windows.acceleration_count)
-    # The ground differs from spell to spell, a sensor's zero does not.
-    ground = stated.assumed("slope") / np.sqrt(len(stops))
-    other = GRAVITY * (stated.assumed("pitch_offset") if pitched else ground)
+    # The ground differs from place to place, a sensor's zero does not.
+    places = _places(windows, stops)
+    other = GRAVITY * (
+        stated.assumed("pitch_offset") if pitched else stated.assumed("slope") / np.sqrt(places)
+    )
     own = stated.assumed("acceleration_bias")
     if abs(total) > 3 * np.hypot(own, other):
-        own = max(own, Uncertainty().assumed("acceleration_bias"))
+        mounting = Uncertainty().assumed("acceleration_bias")
+        own = max(own, mounting)
+        if not pitched:  # the machine may as well have stood on a hill
+            other = max(other, mounting / np.sqrt(places))
     share = own**2 / (own**2 + other**2)
     left = own * other / np.hypot(own, other)
     sentence = (
@@ -338,6 +344,18 @@ def inclination_zeros(
         pitch_key, tilt, float(np.hypot(rest * error, left)) / GRAVITY, "rad", rests_on, sentence
     )
     return [bias, pitch], []
+
+
+def _places(windows: Windows, stops: Sequence[slice]) -> int:
+    """In how many places, `_HILL` apart along the way, the stops of one log surely are: the next log may begin where this one did."""
+    most = 0
+    for log in {int(windows.recording[s.start]) for s in stops}:
+        count, last = 0, -np.inf
+        for at in sorted(windows.position[s.start, 0] for s in stops if windows.recording[s.start] == log):
+            if at - last > _HILL:
+                count, last = count + 1, at
+        most = max(most, count)
+    return most
 
 
 def yaw_rate_zero(windows: Windows, vehicle: Vehicle) -> tuple[float, float]:
