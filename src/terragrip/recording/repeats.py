@@ -43,7 +43,8 @@ class Repeats:
 def merged(columns: Mapping[str, Column], stamp: str) -> tuple[dict[str, Column], Repeats]:
     """Columns (n,) with one row for each run of equal stamps in the column ``stamp`` whose values do not differ, and the repeats.
 
-    Rows that stand up to `LATE` places too late are sorted before. A value missing in one row of a run is filled from the others: a logger writes a row for each message, or writes twice.
+    Rows that stand up to `LATE` places too late are sorted before.
+    A value missing in one row of a run is filled from the others: a logger writes a row for each message, or writes twice.
     A run with two different values in a column is left as it is, for the recording to refuse: nothing shows which was measured when.
     """
     columns, late = _in_order(columns, stamp)
