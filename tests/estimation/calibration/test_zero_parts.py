@@ -69,7 +69,7 @@ def inclined(reads: float, pitch: float | None = None, apart: float = 40.0) -> W
 def test_what_an_accelerometer_rests_at_is_split_by_the_priors(
     vehicle: Vehicle, pitch: float | None, stated: dict[str, float]
 ) -> None:
-    """Two stops in two places, 18 windows of 25 samples with noise of .1: bias over 9.8 slope, or over 9.8 times the pitch sensor's zero."""
+    """Stops in two places, 18 windows of 25 samples with noise of .1: bias over 9.8 slope, or over 9.8 times the pitch sensor's zero."""
     reads = 0.12
     found, unknown = inclination_zeros(inclined(reads, pitch), stating(vehicle, **stated), ["a"], 0.1)
     total = reads - (0.0 if pitch is None else GRAVITY * np.sin(pitch))
