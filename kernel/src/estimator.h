@@ -264,6 +264,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_relative(const tg_estimator *e, tg_real square);
+tg_real tgi_scatter(const tg_estimator *e);
 tg_real tgi_unseen_load(const tg_estimator *e);
 tg_real tgi_unseen_bumps(const tg_estimator *e);
 tg_real tgi_unseen_grade(const tg_estimator *e);

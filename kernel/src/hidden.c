@@ -28,22 +28,22 @@ static tg_real product(const tgi_constants *c, const tg_real *a, const tg_real *
     return sum / (tg_real)c->slopes;
 }
 
-/* Add the products of two stretches, `away` wheel radii between their middles: to the variance of adhesion by load, and to that of the
- * adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them, or greater ones as far as it is
- * itself beyond two SDs of chance. */
+/* Add the products of two stretches, `away` wheel radii between their middles: to the relative variance of adhesion by load, and to that of
+ * the adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them, or greater ones as far as it is
+ * itself beyond two SDs of chance; as far as it is chance, slips are taken to hide as much as the adhesions show (docs/decisions/0173). */
 static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
 {
     tgi_hidden *h = &e->hidden;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real slope = k->bend * tgi_max(h->pulling, 0) / tgi_max(h->slipping, k->least_slip);
-    const tg_real alike = tgi_exp(-tgi_square(away / TG_LOAD_LENGTH) / 2), shown = e->roughness.scatter;
+    const tg_real alike = tgi_exp(-tgi_square(away / TG_LOAD_LENGTH) / 2), level = tgi_relative(e, 1), shown = level * e->roughness.scatter;
     tg_real here[TG_MAX_WHEELS], there[TG_MAX_WHEELS];
     if (!(shown > 0)) return;
     for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
         here[i] = now->adhesion[i] - slope * now->slip[i];
         there[i] = before->adhesion[i] - slope * before->slip[i];
     }
-    const tg_real plain = product(&e->constants, now->adhesion, before->adhesion), beyond = product(&e->constants, here, there) - plain;
+    const tg_real plain = level * product(&e->constants, now->adhesion, before->adhesion), beyond = level * product(&e->constants, here, there) - plain;
     if (h->count < k->hill_memory / k->slip_length) h->count += 1;
     h->plain += (alike * plain - h->plain) / h->count;
     h->beyond += (alike * beyond - h->beyond) / h->count;
@@ -51,16 +51,17 @@ static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stret
     h->square += (tgi_square(alike * beyond) - h->square) / h->count;
     const tg_real found = tgi_square(h->beyond), chance = h->square / h->count;
     const tg_real expected = tgi_square(shown * h->weight) + tgi_max(found - tgi_square(TG_BEYOND_CHANCE) * chance, 0);
-    h->load = h->beyond / (h->weight * (1 + chance / expected));
+    h->load = (h->beyond / h->weight * expected + tgi_relative(e, tgi_scatter(e)) * chance) / (expected + chance);
 }
 
-/* Of adhesions whose scatter is `scatter`, the variance that is loads': more where slips hide loads, by all trends and the mean; less, in
- * proportion, where they follow the curve. */
+/* Of adhesions whose scatter is `scatter`, the relative variance that is loads': more where slips hide loads, by all trends and the mean;
+ * less, in proportion, where they follow the curve. */
 tg_real tgi_by_load(const tg_estimator *e, tg_real scatter)
 {
     const tgi_hidden *h = &e->hidden;
-    if (h->load >= 0 || !(h->plain > 0)) return scatter + tgi_max(h->load, 0) * (1 - e->constants.share * (tg_real)e->constants.warps);
-    return scatter * tgi_max(1 + h->load * h->weight / h->plain, 0);
+    const tg_real shown = tgi_relative(e, scatter);
+    if (h->load >= 0 || !(h->plain > 0)) return shown + tgi_max(h->load, 0) * (1 - e->constants.share * (tg_real)e->constants.warps);
+    return shown * tgi_max(1 + h->load * h->weight / h->plain, 0);
 }
 
 static void end_stretch(tg_estimator *e)

@@ -1,7 +1,7 @@
 /* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load varies over the ground's
  * bumps: the force follows the load, and the estimate mistakes it for adhesion. Wheels at one slip share a curve, so the difference of one
- * wheel's adhesion from the others' within a few wheel radii counts as unseen load, a variance relative to the adhesion; where only one
- * wheel is driven, its difference from its own mean. rho_s varies likewise: a wheel that climbs a bump is held back by load times gradient,
+ * wheel's adhesion from the others' within a few wheel radii counts as unseen load, a variance relative to the adhesion. A wheel that no
+ * motor drives is at no such slip, though its torque be measured: it does not count (docs/decisions/0173). Where only one wheel is driven, its difference from its own mean. rho_s varies likewise: a wheel that climbs a bump is held back by load times gradient,
  * which no pitch sensor reads, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
 #include "estimator.h"
 
@@ -65,7 +65,7 @@ void tgi_watch_roughness(tg_estimator *e, int32_t flowing, tg_real distance)
     for (int32_t i = 0; i < n; i++) {
         if (!flowing) r->adhesion[i] = mu[i];
         r->adhesion[i] += fresh * (mu[i] - r->adhesion[i]);
-        if (!e->settings.driven[i]) continue;
+        if (!e->settings.driven[i] || !e->constants.watched[i]) continue;
         change[driven++] = mu[i] - r->adhesion[i];
         square += tgi_square(mu[i]);
         own += e->belief.P[i * (tgi_stride(n) + 1)];
@@ -106,13 +106,15 @@ tg_real tgi_unseen_bumps(const tg_estimator *e)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Relative variance of a wheel's load that the loads of the model do not contain: the scatter less the estimates' own noise
- * (docs/decisions/0159), with what slips show (hidden.c). Of a load that is correlated over TG_LOAD_LENGTH the low-pass leaves
+/* Mean square by which the wheels' adhesions differ, less the estimates' own noise (docs/decisions/0159). */
+tg_real tgi_scatter(const tg_estimator *e) { return tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0); }
+
+/* Relative variance of a wheel's load that the loads of the model do not contain: the scatter, with what slips
+ * show (hidden.c). Of a load that is correlated over TG_LOAD_LENGTH the low-pass leaves
  * length/(length + TG_LOAD_LENGTH) of the variance. */
 tg_real tgi_unseen_load(const tg_estimator *e)
 {
-    const tg_real whole = 1 + TG_LOAD_LENGTH / e->settings.tuned.uneven_length, scatter = tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0);
-    return whole * tgi_relative(e, tgi_by_load(e, scatter));
+    return (1 + TG_LOAD_LENGTH / e->settings.tuned.uneven_length) * tgi_by_load(e, tgi_scatter(e));
 }
 
 /* Variance of the slope that rho_s may contain where nothing measures the slope: hills and soft soil both need thrust. The variation of

@@ -71,8 +71,8 @@ typedef struct { /* loads from slips, see hidden.c */
     tg_real pulling, slipping;    /* of all wheels, likewise */
     tg_real way;                  /* wheel radii since the motion began */
     tgi_stretch now, last[2];     /* this one, the last, and the one before that */
-    tg_real plain, beyond, weight, square, count; /* weighted means over so many pairs of stretches: of adhesions' products, of what slips add; the weights; the latter's squares */
-    tg_real load;                 /* variance of adhesion by load beyond what adhesions show; may be less than 0 */
+    tg_real plain, beyond, weight, square, count; /* weighted means over so many pairs of stretches, relative to the adhesions: of their products, of what slips add; the weights; the latter's squares */
+    tg_real load;                 /* relative variance of adhesion by load beyond what adhesions show; may be less than 0 */
 } tgi_hidden;
 
 typedef struct { /* errors of the ground speed that last, see slow_speed.c */

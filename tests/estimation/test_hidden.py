@@ -113,3 +113,34 @@ def test_loads_of_a_diagonal_that_only_slips_show_are_in_the_interval_once(seed:
 def test_on_even_ground_slips_noise_widens_nothing(seed: int) -> None:
     _, spread = adhesions(log(by_load=0.0, seed=seed))
     assert np.sqrt(np.mean(spread**2)) < 0.04 * PULL
+
+
+def test_a_free_wheel_whose_torque_is_measured_is_no_measure_of_uneven_loads() -> None:
+    """It does not slip as the driven ones do: a pull that comes and goes changes their adhesion alone, on even ground."""
+    rng, time = np.random.default_rng(1), np.arange(0, 150, 1 / RATE)
+    mu = PULL + 0.15 * np.sin(2 * np.pi * SPEED * time / (8 * RADIUS))
+    load, slip = MASS * 9.81 / 4, SLIP * (mu / PULL) / (2 - mu / PULL)
+    channels = {
+        "ground_speed": np.full(len(time), SPEED),
+        "drawbar_force": 2 * load * mu - RESISTANCE * MASS * 9.81,
+    }
+    for side in SIDES:
+        channels |= {
+            f"wheel_speed_{side}a": np.full(len(time), SPEED / RADIUS),
+            f"drive_torque_{side}a": 0 * mu,
+        }
+        channels |= {
+            f"wheel_speed_{side}b": SPEED / (RADIUS * (1 - slip)),
+            f"drive_torque_{side}b": RADIUS * load * mu,
+        }
+    for name, value in channels.items():
+        channels[name] = value + NOISE[
+            name.rsplit("_", 1)[0] if "wheel" in name or "torque" in name else name
+        ] * rng.normal(size=len(time))
+    data = vehicle(2).to_dict()
+    data["axles"]["a"]["driven"] = False
+    found, late = estimate(Recording(time, channels), Vehicle.from_dict(data)), time > 50
+    for wheel in ("lb", "rb"):
+        spread = found[f"adhesion_{wheel}_std"][late]
+        assert np.mean(np.abs(found[f"adhesion_{wheel}"] - mu)[late] <= 1.96 * spread) > 0.95
+        assert np.sqrt(np.mean(spread**2)) < 0.06 * PULL

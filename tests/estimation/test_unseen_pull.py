@@ -43,7 +43,7 @@ def test_a_measured_pull_and_a_vehicle_without_a_hitch_know_their_loads() -> Non
     def width(log: Drive, vehicle: Vehicle) -> float:
         return float(np.median(estimate(log.recording, vehicle)["adhesion_fl_std"]))
 
-    assert width(bare, no_hitch) < 1.25 * width(towing, robot()) < 0.5 * width(bare, robot())
+    assert max(width(bare, no_hitch), width(towing, robot())) < 0.2 * width(bare, robot())
 
 
 def test_a_pull_that_the_file_states_is_in_the_intervals_and_changes_no_estimate() -> None:
