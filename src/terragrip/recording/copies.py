@@ -103,14 +103,13 @@ def replay_warnings(recording: Recording) -> list[str]:
     values = [v for v in recording.channels.values() if not is_one_value(v)]
     if len(values) < _CHANNELS:
         return []
-    coded = np.array([np.where(np.isnan(v), _MISSING, (v + 0.0).view(np.int64)) for v in values])
-    differs = coded[:, 1:] != coded[:, :-1]
-    kept = np.r_[0, np.flatnonzero(differs.any(axis=0)) + 1]  # a row that keeps all values is none of its own
-    first, last, distance = _longest(_hashes(coded[:, kept]))
+    hashes = _hashes(values)
+    kept = np.r_[0, np.flatnonzero(np.diff(hashes)) + 1]  # a row that keeps all values is none of its own
+    first, last, distance = _longest(hashes[kept])
     if not distance or last - first < _CHANGES:
         return []
-    rows = slice(kept[first], kept[last])
-    if np.sum(np.count_nonzero(differs[:, rows], axis=1) >= _CHANGES) < _CHANNELS:
+    rows = slice(kept[first], kept[last] + 1)
+    if sum(np.count_nonzero(np.diff(_coded(v[rows]))) >= _CHANGES for v in values) < _CHANNELS:
         return []
     start, end, before, until = (
         recording.time[kept[k]] for k in (first, last, first - distance, last - distance)
@@ -121,11 +120,21 @@ def replay_warnings(recording: Recording) -> list[str]:
     ]
 
 
-def _hashes(coded: Ints) -> Ints:
-    """A number for each row (n,) of channels (k, n), equal where all values are."""
-    factors = np.random.default_rng(0).integers(1 << 62, size=len(coded), dtype=np.int64) | 1
-    mixed = coded ^ (coded >> np.int64(29))
-    return np.sum(mixed * factors[:, None], axis=0)
+def _coded(values: Floats) -> Ints:
+    """A channel's values (n,) as whole numbers, equal where they are."""
+    coded = (values + 0.0).view(np.int64)
+    coded[np.isnan(values)] = _MISSING
+    return coded
+
+
+def _hashes(channels: list[Floats]) -> Ints:
+    """A number for each row (n,) of the channels, equal where all values are."""
+    factors = np.random.default_rng(0).integers(1 << 62, size=len(channels), dtype=np.int64) | 1
+    hashes = np.zeros(len(channels[0]), dtype=np.int64)
+    for values, factor in zip(channels, factors, strict=True):
+        coded = _coded(values)
+        hashes += (coded ^ (coded >> np.int64(29))) * factor
+    return hashes
 
 
 def _longest(rows: Ints) -> tuple[int, int, int]:

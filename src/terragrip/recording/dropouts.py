@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,11 +75,20 @@ def _zeros(
     return rows, others, text
 
 
+def _often_zero(recording: Recording, names: Iterable[str]) -> list[str]:
+    """Those channels that are 0, not always, and may keep a value for `LONG`."""
+    return [
+        name
+        for name in names
+        if np.any((values := recording.channels[name]) == 0.0)
+        and not is_one_value(values)
+        and may_last(*known_part(recording.time, values))
+    ]
+
+
 def _lost(recording: Recording, name: str, meanwhile: Bools, others: Floats) -> tuple[float, float] | None:
-    """The longest stretch in which a channel, not always 0, is 0 in rows ``meanwhile`` (n,), where it and ``others`` (n,) are known."""
+    """The longest stretch in which a channel is 0 in rows ``meanwhile`` (n,), where it and ``others`` (n,) are known."""
     values = recording.channels[name]
-    if is_one_value(values) or not may_last(*known_part(recording.time, values)):
-        return None
     return longest(recording.time, (values == 0.0) & meanwhile, np.isfinite(values + others))
 
 
@@ -86,11 +96,12 @@ def _wheels(recording: Recording) -> list[str]:
     """A sentence on wheels that read 0 for long while the ground speed goes on."""
     rims = rim_names(recording.channels)
     ground, notes = recording.channels.get("ground_speed"), []
-    if ground is None or len(rims) < 2:
+    if ground is None or len(rims) < 2 or not (suspects := _often_zero(recording, rims)):
         return []
     stretches: dict[tuple[float, float], list[str]] = {}
-    for name in rims:
-        if stretch := _lost(recording, name, _drives(ground), ground):
+    driving = _drives(ground)
+    for name in suspects:
+        if stretch := _lost(recording, name, driving, ground):
             stretches.setdefault(stretch, []).append(name)
     for stretch, names in stretches.items():
         few = len(names) == 1
@@ -111,7 +122,7 @@ def _drives(speed: Floats) -> Bools:
 def _ground(recording: Recording) -> list[str]:
     """A sentence on a ground speed that reads 0 for long while all wheels go on."""
     rims = [recording.channels[name] for name in rim_names(recording.channels)]
-    if "ground_speed" not in recording.channels or not rims:
+    if "ground_speed" not in recording.channels or not rims or not _often_zero(recording, ["ground_speed"]):
         return []
     driving = np.logical_and.reduce([_drives(rim) for rim in rims])
     stretch = _lost(recording, "ground_speed", driving, np.sum(rims, axis=0))
@@ -127,9 +138,9 @@ def _torques(recording: Recording) -> list[str]:
     """A sentence on each torque that alone is 0 for long: an axle that is switched off has two of them."""
     notes = []
     torques = {n: v for n, v in recording.channels.items() if n.startswith("drive_torque_")}
-    for name, values in torques.items():
+    for name in _often_zero(recording, torques):
         others = [other != 0.0 for one, other in torques.items() if one != name]
-        if others and (stretch := _lost(recording, name, np.logical_and.reduce(others), values)):
+        if others and (stretch := _lost(recording, name, np.logical_and.reduce(others), torques[name])):
             notes.append(
                 f"{name} is 0 {span(*stretch)} while all other torques are not: its sensor lost the signal, "
                 "or its motor is off. If the sensor did, leave these cells empty."

@@ -192,8 +192,11 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     """On a speed (n,) that again and again keeps one value at speed, however shortly, though its noise moves each sample by more than its
     resolution: other speeds hardly change then."""
     when, what = known_part(time, values)
-    first = np.flatnonzero(np.r_[True, (np.diff(what) != 0.0) | gaps(when)])
-    if len(first) < 3 or is_one_value(what):
+    changes = np.diff(what) != 0.0
+    if np.count_nonzero(~changes) < _OFTEN or is_one_value(what):
+        return []
+    first = np.flatnonzero(np.r_[True, changes | gaps(when)])
+    if len(first) < 3:
         return []
     lasting = when[np.r_[first[1:], len(what)] - 1] - when[first]
     rows = lasting >= max(_SECOND, _RUN * median(np.diff(when[first])))

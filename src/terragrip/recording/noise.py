@@ -60,18 +60,20 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     """
     if len(values) < _FEWEST:
         return None
-    spacing = np.lib.stride_tricks.sliding_window_view(np.diff(time), 3)
-    even = spacing.max(axis=1) < 4 * spacing.min(axis=1)
+    steps = np.diff(time)
+    three = steps[:-2], steps[1:-1], steps[2:]
+    even = np.maximum(np.maximum(*three[:2]), three[2]) < 4 * np.minimum(np.minimum(*three[:2]), three[2])
     moving = (values[:-3] != values[1:-2]) | (values[1:-2] != values[2:-1]) | (values[2:-1] != values[3:])
     first = np.flatnonzero(even & moving)
     if len(first) < _FEWEST:
         return None
     first = first[:: max(1, len(first) // _ENOUGH)]
-    four = np.arange(4)
-    when, sample = time[first[:, None] + four], values[first[:, None] + four]
-    apart = when[:, :, None] - when[:, None, :] + np.eye(4)
-    weight = 1.0 / apart.prod(axis=2)
-    third = (weight * sample).sum(axis=1) / np.sqrt((weight**2).sum(axis=1))
+    a, b, c, d = (time[first + k] for k in range(4))
+    ab, ac, ad, bc, bd, cd = a - b, a - c, a - d, b - c, b - d, c - d
+    weights = [1.0 / (ab * ac * ad), -1.0 / (ab * bc * bd), 1.0 / (ac * bc * cd), -1.0 / (ad * bd * cd)]
+    third = sum(weight * values[first + k] for k, weight in enumerate(weights)) / np.sqrt(
+        sum(w**2 for w in weights)
+    )
     scale = MAD_TO_SD * median(np.abs(third))
     floor = quantum(values) / np.sqrt(12.0)
     return max(scale, floor, 1e-4 * quantile(np.abs(usual_values(values)), 0.95))

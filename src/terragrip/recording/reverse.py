@@ -42,14 +42,13 @@ def against_warnings(recording: Recording) -> list[str]:
     if known[:1] != ["ground_speed"]:
         return []
     ground = filled(time, channels["ground_speed"])
-    odd = []
+    large, odd = _large(ground), []
     for name in known[1:]:
         rim = channels[name]
-        moving = _large(rim) & _large(ground)
-        if not (_is_motion(rim) and _is_motion(ground)):
-            continue
-        if np.sum((rim * ground)[moving] < 0) > _MOSTLY * moving.sum():
+        moving = _large(rim) & large
+        if np.sum((rim * ground)[moving] < 0) > _MOSTLY * moving.sum() and _is_motion(rim):
             odd.append(name)
+    odd = odd if odd and _is_motion(ground) else []
     if not odd:
         return []
     other = "" if odd != known[1:] else " (or for ground_speed, if the vehicle drove backward)"

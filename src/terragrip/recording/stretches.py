@@ -57,13 +57,18 @@ def without_pauses(time: Floats, longest: float) -> Floats:
 def gaps(when: Floats) -> Bools:
     """Where samples at these instants (n,) are missing (n - 1,): no value is repeated across."""
     steps = np.diff(when)
-    return steps > max(_GAP, _APART * median(steps)) if len(steps) else np.zeros(0, dtype=bool)
+    if steps.max(initial=0.0) <= _GAP:  # of most logs
+        return np.zeros(len(steps), dtype=bool)
+    return steps > max(_GAP, _APART * median(steps))
 
 
 def is_one_value(values: Floats) -> bool:
     """Whether the finite values, three at least, are all equal."""
-    known = values[np.isfinite(values)]
-    return len(known) > 2 and bool(np.ptp(known) == 0.0)
+    for part in (values[:_LOOKS], values):  # the first show of most that they are not
+        known = part[np.isfinite(part)]
+        if len(known) > 1 and np.ptp(known) != 0.0:
+            return False
+    return len(known) > 2
 
 
 def step_of(values: Floats, least: float, *, beyond: float, long: int) -> tuple[int, float] | None:

@@ -33,9 +33,13 @@ def window_means(values: Floats, place: Ints, count: int) -> Floats:
     known = np.isfinite(values)
     if not known.all():
         values, place = values[known], place[known]
-    edges = np.searchsorted(place, np.arange(count + 1))
+    return _means(values, np.searchsorted(place, np.arange(count + 1)))
+
+
+def _means(values: Floats, edges: Ints) -> Floats:
+    """Means of values (n,) between ``edges`` (m + 1,), NaN where these are equal."""
     number, used = np.diff(edges), edges[:-1] < len(values)
-    total = np.zeros(count)
+    total = np.zeros(len(number))
     total[used] = np.add.reduceat(values, edges[:-1][used])
     return np.where(number > 0, total / np.maximum(number, 1), np.nan)
 
@@ -46,8 +50,12 @@ def averaged(recording: Recording, step: float) -> Recording:
     starts = np.flatnonzero(np.diff(place, prepend=np.nan))
     if 2 * len(starts) > len(place):
         return recording
-    count = len(starts)
-    place = np.repeat(np.arange(count), np.diff(starts, append=len(place)))
-    channels = {name: window_means(values, place, count) for name, values in recording.channels.items()}
-    time = window_means(recording.time, place, count)
-    return replace(recording, time=time, channels=channels, labels={})
+    edges = np.r_[starts, len(place)]
+    place = np.repeat(np.arange(len(starts)), np.diff(edges))
+
+    def means(values: Floats) -> Floats:
+        whole = np.isfinite(values).all()
+        return _means(values, edges) if whole else window_means(values, place, len(starts))
+
+    channels = {name: means(values) for name, values in recording.channels.items()}
+    return replace(recording, time=means(recording.time), channels=channels, labels={})
