@@ -13,7 +13,7 @@ from terragrip.cli.output import check_file
 from terragrip.errors import InputError
 
 if TYPE_CHECKING:
-    from terragrip.formats.inspect import Inspection
+    from terragrip.formats.inspection import Inspection
 
 
 def command(

@@ -1,4 +1,5 @@
-"""NumPy columns as Arrow arrays and back, by their own memory. ``pa.array`` and ``to_numpy`` import pandas where it is: 0.6 s and 50 MB."""
+"""NumPy columns as Arrow arrays and back, by their own memory. ``pa.array`` and ``to_numpy`` import pandas where it is: 0.6 s and 50 MB;
+a cast all of Arrow's functions: a fifteenth of a short `estimate`."""
 
 from __future__ import annotations
 
@@ -42,9 +43,15 @@ def choices(codes: npt.NDArray[np.uint8], names: Sequence[str]) -> pa.Array:
     """A column of texts (n,) that are the ``names`` of its codes."""
     import pyarrow as pa
 
-    flat = np.ascontiguousarray(codes).view(np.int8)
-    indices = pa.Array.from_buffers(pa.int8(), len(flat), [None, pa.py_buffer(flat)])
-    return pa.DictionaryArray.from_arrays(indices, texts(names)).cast(pa.string())
+    words = [name.encode() for name in names]
+    sizes = np.array([len(word) for word in words])
+    length, begin = sizes[codes], (np.cumsum(sizes) - sizes)[codes]
+    ends = np.r_[0, np.cumsum(length)]
+    letters = np.frombuffer(b"".join(words), np.uint8)[
+        np.arange(ends[-1]) + np.repeat(begin - ends[:-1], length)
+    ]
+    buffers = [None, pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(letters)]
+    return pa.Array.from_buffers(pa.string(), len(codes), buffers)
 
 
 def values_of(column: pa.ChunkedArray) -> npt.NDArray[Any]:

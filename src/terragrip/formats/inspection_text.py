@@ -12,7 +12,7 @@ from terragrip.text import aligned
 
 if TYPE_CHECKING:
     from terragrip.formats.channel_proposal import Proposal
-    from terragrip.formats.inspect import ColumnSummary, Inspection, TimeSummary
+    from terragrip.formats.inspection import ColumnSummary, Inspection, TimeSummary
 
 _HEAD = ("column", "unit", "count", "missing", "rate", "held", "noise", "min", "5 %", "median", "95 %", "max")
 

@@ -79,8 +79,8 @@ def in_si(table: LogTable) -> dict[str, npt.NDArray[Any]]:
 def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
     """An Arrow column as NumPy; raises InputError on a type that holds neither numbers, texts nor dates.
 
-    Reads Arrow's buffers, since its own ``to_numpy`` and its scalars import pandas, which takes longer than a
-    small log.
+    Reads Arrow's buffers, since its own ``to_numpy`` and its scalars import pandas, and casts and ``is_null`` all of Arrow's functions,
+    which takes longer than a small log.
     """
     import pyarrow as pa
 
@@ -106,22 +106,23 @@ def from_arrow(name: str, column: Any, source: str | None) -> npt.NDArray[Any]:
         raise InputError(
             f"has {kind}, not numbers", file=source, place=f"column {name}", hint="give one number per row"
         )
-    if column.null_count or not pa.types.is_integer(column.type):
+    if column.type != pa.float64() and (column.null_count or not pa.types.is_integer(column.type)):
         column = column.cast(pa.float64())
     return _numbers(column, np.nan)
 
 
 def _numbers(column: Any, missing: float) -> npt.NDArray[Any]:
     """Numbers as NumPy, not copied where they lie in one piece; what is missing becomes ``missing``."""
-    import pyarrow as pa
 
     whole = _whole(column)
     dtype = np.dtype(whole.type.to_pandas_dtype())
     values = np.frombuffer(whole.buffers()[1] or b"", dtype)[whole.offset :][: len(whole)]
     if not whole.null_count:
         return values
-    absent = np.from_dlpack(whole.is_null().cast(pa.int8())).astype(bool)
-    return np.where(absent, np.asarray(missing, dtype=dtype), values)
+    present = np.unpackbits(np.frombuffer(whole.buffers()[0], np.uint8), bitorder="little")[whole.offset :][
+        : len(whole)
+    ]
+    return np.where(present, values, np.asarray(missing, dtype=dtype))
 
 
 def _texts(column: Any) -> npt.NDArray[np.object_]:

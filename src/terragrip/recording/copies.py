@@ -29,6 +29,9 @@ _APART = 0.1  # of the pace, that hubs of an axle differ by in a turn
 _CHANNELS = 4  # that change within the rows
 _CHANGES = 10  # of each of these: a coarse channel has two values to choose from each time, all together 2^40
 _MISSING = np.int64(0x7FF8 << 48)
+_FACTOR = np.int64(
+    6364136223846793005
+)  # Knuth's of a linear congruential generator: it spreads all bits but the last
 
 
 def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
@@ -129,12 +132,11 @@ def _coded(values: Floats) -> Ints:
 
 def _hashes(channels: list[Floats]) -> Ints:
     """A number for each row (n,) of the channels, equal where all values are."""
-    factors = np.random.default_rng(0).integers(1 << 62, size=len(channels), dtype=np.int64) | 1
     hashes = np.zeros(len(channels[0]), dtype=np.int64)
-    for values, factor in zip(channels, factors, strict=True):
+    for values in channels:
         coded = _coded(values)
-        hashes += (coded ^ (coded >> np.int64(29))) * factor
-    return hashes
+        hashes = hashes * _FACTOR + (coded ^ (coded >> np.int64(29)))
+    return hashes * _FACTOR
 
 
 def _longest(rows: Ints) -> tuple[int, int, int]:

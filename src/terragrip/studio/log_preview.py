@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from terragrip.formats.channel_proposal import Proposal
-    from terragrip.formats.inspect import Inspection
+    from terragrip.formats.inspection import Inspection
     from terragrip.formats.outline import Outline
 
 TITLES = {

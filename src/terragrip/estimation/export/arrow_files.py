@@ -24,7 +24,8 @@ class _ArrowFile:
 
     def write(self, part: Estimates) -> None:
         """Write the rows of a part."""
-        self._writer.write_table(part.to_arrow().cast(self._schema))
+        table = part.to_arrow()  # of the same types, but where its texts are too many for short offsets
+        self._writer.write_table(table if table.schema.equals(self._schema) else table.cast(self._schema))
 
     def close(self) -> None:
         """Complete the file."""
