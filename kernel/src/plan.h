@@ -139,7 +139,7 @@ TG_INLINE tg_status plan_step(const tg_filter *f, const tgi_call *call, tgi_plan
     plan->before = call->before;
     plan->count = 0;
     if (call->y) {
-        status = plan_check_input(call->now, n);
+        if (call->now != call->before) status = plan_check_input(call->now, n);
         if (status == TG_OK) status = plan_channels(f, call, plan, n);
         if (status != TG_OK) return status;
     }

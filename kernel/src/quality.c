@@ -161,15 +161,15 @@ static tg_real possible_rate(const tg_estimator *e, const tg_row *row, int32_t s
     const int32_t n = e->settings.machine.wheels, ground = slot == TG_GROUND_SPEED, j = ground ? n + 1 : n + 2 + slot - TG_WHEEL_SPEED;
     const tg_real rate = e->constants.agility[slot];
     const tgi_scene *const s = &e->scene;
-    if (!e->seen_motion || e->standing) return rate;
-    tg_real off = tgi_square(beyond_estimate(e, row, slot, j)), variance = e->belief.P[j * (tgi_stride(n) + 1)] + e->constants.variance[slot];
+    const tg_real beyond = beyond_estimate(e, row, slot, j), meanwhile = tgi_square(rate / 2 * (tg_real)(row->time - e->time));
+    tg_real off = tgi_square(beyond), variance = e->belief.P[j * (tgi_stride(n) + 1)] + e->constants.variance[slot];
+    if (!e->seen_motion || e->standing || !(off > meanwhile)) return rate;
     if (ground) {
-        const tg_real with_rims = tgi_square(beyond_estimate(e, row, slot, j) - rims_beyond(e, row));
+        const tg_real with_rims = tgi_square(beyond - rims_beyond(e, row));
         if (with_rims < off) off = with_rims;
         variance = tgi_max(variance, s->reckoned) + s->slow_speed + s->disputed + s->late + row->turn_variance;
     }
-    const tg_real meanwhile = rate / 2 * (tg_real)(row->time - e->time);
-    return off > tgi_square(e->settings.tuned.spike) * variance + tgi_square(meanwhile) ? (tg_real)TG_TINY : rate;
+    return off > tgi_square(e->settings.tuned.spike) * variance + meanwhile ? (tg_real)TG_TINY : rate;
 }
 
 /* A jump of a speed is a spike until the next sample confirms it: until then the jump itself is its uncertainty. A change that a vehicle

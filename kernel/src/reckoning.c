@@ -50,14 +50,20 @@ static tg_real slip_at(const tg_tuned *k, tg_real slip, tg_real from, tg_real ad
     return result < (tg_real)-0.2 ? (tg_real)-0.2 : result > (tg_real)0.8 ? (tg_real)0.8 : result;
 }
 
+/* What the vehicle usually slips at this adhesion. */
+static tg_real usual_at(const tg_estimator *e, tg_real adhesion)
+{
+    return slip_at(&e->settings.tuned, e->slip_memory.usual, e->slip_memory.usual_adhesion, adhesion);
+}
+
 /* s that a row's ground speed stands for. */
 static tg_real since_ground(const tg_estimator *e, tg_real dt)
 {
     return tgi_max(dt, e->ground.interval < e->settings.gap ? e->ground.interval : e->settings.gap);
 }
 
-/* A row whose ground speed v was measured, at the mean rim speed and adhesion; both along the travel. */
-static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, tg_real dt)
+/* A row whose ground speed v was measured, at the mean rim speed and adhesion, both along the travel, and the usual slip there. */
+static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, tg_real usual, tg_real dt)
 {
     const tg_tuned *const k = &e->settings.tuned;
     tgi_slip_memory *m = &e->slip_memory;
@@ -66,7 +72,7 @@ static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, 
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
     m->slip += gain * (slip - m->slip);
     m->adhesion += gain * (adhesion - m->adhesion);
-    const tg_real travelled = rim * since_ground(e, dt) / e->constants.mean_radius, away = slip - slip_at(k, m->usual, m->usual_adhesion, adhesion);
+    const tg_real travelled = rim * since_ground(e, dt) / e->constants.mean_radius, away = slip - usual;
     m->way = m->way + travelled < k->hill_memory ? m->way + travelled : k->hill_memory;
     const tg_real share = travelled < m->way ? travelled / m->way : 1, most = 2 * tgi_sqrt(m->apart); /* spinning wheels are not the rule */
     m->usual += share * (away > most ? most : away < -most ? -most : away);
@@ -81,12 +87,12 @@ static tg_real go_unseen(tg_estimator *e, tg_real rim, tg_real dt)
     return tgi_exp(-e->slip_memory.unseen / e->settings.tuned.uneven_memory);
 }
 
-/* Ground speed along the travel at these rims and adhesion, and its variance: `error` is that of the slip apart from what ground does to it. */
-static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real keep, tg_real error, tg_real *variance)
+/* Ground speed along the travel at these rims and adhesion, with the usual slip there, and its variance: `error` is that of the slip apart
+ * from what ground does to it. */
+static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real usual, tg_real keep, tg_real error, tg_real *variance)
 {
-    const tg_tuned *const k = &e->settings.tuned;
     const tgi_slip_memory *const m = &e->slip_memory;
-    const tg_real last = slip_at(k, m->slip, m->adhesion, adhesion), usual = slip_at(k, m->usual, m->usual_adhesion, adhesion);
+    const tg_real last = slip_at(&e->settings.tuned, m->slip, m->adhesion, adhesion);
     *variance = tgi_square(rim) * (error + (1 - keep) * (m->apart + keep * tgi_square(last - usual)));
     return rim * (1 - usual - keep * (last - usual));
 }
@@ -111,9 +117,10 @@ void tgi_watch_signs(tg_estimator *e, const tg_real *o)
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         const tg_real rim = s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED + i], slip = o[TG_OUT_SLIP + i], mu = o[TG_OUT_ADHESION + i];
+        if (!(slip * mu < 0)) return;
         const tg_real speeds = speed + tgi_square(s->rolling_radius[i] * o[TG_OUT_WHEEL_SPEED_STD + i]);
         const tg_real apart = speeds / tgi_square(tgi_max(tgi_fabs(rim), s->standstill_speed)) + tgi_square(s->uncertainty.wheel_radius);
-        if (!(slip * mu < 0 && tgi_square(slip) > TG_BEYOND * apart && tgi_square(mu) > TG_BEYOND * tgi_square(o[TG_OUT_ADHESION_STD + i]))) return;
+        if (!(tgi_square(slip) > TG_BEYOND * apart && tgi_square(mu) > TG_BEYOND * tgi_square(o[TG_OUT_ADHESION_STD + i]))) return;
     }
     e->slip_memory.contrary = 1;
 }
@@ -129,7 +136,8 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     tg_real rim, adhesion, variance;
     means(e, NULL, drive, &rim, &adhesion);
     const tg_real keep = m->astray ? go_unseen(e, rim, since) : 1;
-    const tg_real off = tgi_square(v - reckoned_at(e, rim, adhesion, keep, tgi_square(e->settings.tuned.slip_spread) + tgi_square(m->slip / 4), &variance));
+    const tg_real usual = usual_at(e, adhesion), error = tgi_square(e->settings.tuned.slip_spread) + tgi_square(m->slip / 4);
+    const tg_real off = tgi_square(v - reckoned_at(e, rim, adhesion, usual, keep, error, &variance));
     variance += e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
     m->agreeing = off < variance && !m->contrary ? m->agreeing + since : 0;
     m->calm = m->unusual || m->contrary ? 0 : m->calm + since;
@@ -137,7 +145,7 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     m->against = m->contrary || (m->unusual && off > TG_BEYOND * variance);
     if (m->against && before) m->astray = 1;
     else if (m->agreeing > TG_AGREED || m->calm > TG_CALM) m->astray = 0;
-    if (!m->astray) remember(e, rim, v, adhesion, dt);
+    if (!m->astray) remember(e, rim, v, adhesion, usual, dt);
     e->scene.astray = m->astray ? off + variance : 0;
 }
 
@@ -166,7 +174,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
     if (!goes) return;
     tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, rim, adhesion, variance;
     means(e, row, drive, &rim, &adhesion);
-    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, go_unseen(e, rim, dt), tgi_square(k->slip_spread), &variance);
+    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), tgi_square(k->slip_spread), &variance);
     variance += tgi_square((tg_real)0.01);
     e->scene.reckoned = variance;
     if (e->slope.running) {
@@ -205,7 +213,8 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
     tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;
     if (!e->standing) {
         const tg_real rim = rim_of_speeds(e, row), keep = go_unseen(e, rim, dt), error = tgi_square(keep) * e->slip_memory.variance;
-        speed = (tg_real)e->direction * reckoned_at(e, rim, e->settings.prior_adhesion, keep, error, &variance);
+        const tg_real adhesion = e->settings.prior_adhesion;
+        speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), keep, error, &variance);
     }
     e->scene.reckoned = variance;
     row->value[TG_GROUND_SPEED] = speed;
@@ -215,8 +224,8 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
 
 void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt)
 {
-    const tg_real rim = rim_of_speeds(e, row);
+    const tg_real rim = rim_of_speeds(e, row), adhesion = e->settings.prior_adhesion;
     if (row->reckoned || isnan(row->value[TG_GROUND_SPEED])) return;
-    remember(e, rim, (tg_real)e->direction * e->speeds.x[0], e->settings.prior_adhesion, dt);
+    remember(e, rim, (tg_real)e->direction * e->speeds.x[0], adhesion, usual_at(e, adhesion), dt);
     e->slip_memory.variance = e->speeds.P[0][0] / tgi_square(tgi_max(tgi_fabs(rim), 3 * e->settings.standstill_speed));
 }
