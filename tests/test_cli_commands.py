@@ -51,6 +51,19 @@ def test_simulate_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> Non
     assert "accuracy-clean" in output
 
 
+def test_estimate_of_numbers_imports_no_more_than_it_uses(drive: Path, tmp_path: Path) -> None:
+    code = (
+        "import sys; from terragrip.cli import main; code = main(sys.argv[1:]);"
+        "sys.exit(code or sorted({'pandas', 'pyarrow.compute', 'numpy.random', 'terragrip.formats.inspection', 'terragrip.cli.studio'}"
+        " & set(sys.modules)) or 0)"
+    )
+    log = tmp_path / "numbers.csv"
+    pd.read_csv(drive / "log.csv").drop(columns="soil").to_csv(log, index=False)
+    words = ("estimate", log, "--vehicle", drive / "vehicle.yaml", "-o", tmp_path / "e.parquet", "--quiet")
+    done = subprocess.run([sys.executable, "-c", code, *words], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_estimate_writes_the_table_and_says_what_it_found(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
