@@ -193,13 +193,14 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
     resolution: other speeds hardly change then."""
     when, what = known_part(time, values)
     changes = np.diff(what) != 0.0
-    if np.count_nonzero(~changes) < _OFTEN or is_one_value(what):
+    if np.count_nonzero(~changes) < _OFTEN:
         return []
     first = np.flatnonzero(np.r_[True, changes | gaps(when)])
-    if len(first) < 3:
-        return []
     lasting = when[np.r_[first[1:], len(what)] - 1] - when[first]
-    rows = lasting >= max(_SECOND, _RUN * median(np.diff(when[first])))
+    rows = lasting >= _SECOND
+    if rows.sum() < _OFTEN or is_one_value(what):
+        return []
+    rows &= lasting >= _RUN * median(np.diff(when[first]))
     rows &= np.abs(what[first]) > DRIVING * quantile(np.abs(what), 0.95)
     if rows.sum() < _OFTEN or not _is_restless(time, values):
         return []

@@ -91,5 +91,7 @@ def rounding_noise(values: Floats, noise: float = 0.0) -> float:
     if np.count_nonzero(np.diff(known)) <= _RESTLESS * len(known):
         return 0.0
     step = quantum(known[:: max(1, len(known) // _SAMPLES)])
+    if step == 0.0:
+        return 0.0
     lasts = step > max(_COARSE * quantile(np.abs(known), 0.95), _HIDDEN * noise)
     return step / 2.0 if lasts else step / float(np.sqrt(12.0))
