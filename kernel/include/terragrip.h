@@ -323,7 +323,7 @@ typedef struct {
     tg_real silence;                /* s without a ground speed after which it is reckoned from the wheels */
     tg_real slip_memory;            /* s over which slip and adhesion are remembered for that */
     tg_real most_slope;             /* of slip over adhesion */
-    tg_real slip_spread, slip_apart; /* SD of a remembered slip; of slips of one drive about the usual one, until it shows it */
+    tg_real slip_apart;             /* SD of slips of one drive about the usual one, until it shows it */
     tg_real alike, carried_alike;   /* s over which the filter takes the error of a dead-reckoned speed to last; of one predicted by the accelerometer */
     tg_real reckoned_force, carried_force; /* force_walk times this beside it, meanwhile */
     tg_real shock_memory;           /* s: of what the accelerometer reads beyond the model */

@@ -5,6 +5,7 @@
 
 #define TG_DRAWN 2             /* s over which it is summed what ground speeds draw the estimate by */
 #define TG_AGREED 5            /* s that speed, forces and wheels agree again: a drift may pass through what they agree on */
+#define TG_STEADY_SLIP ((tg_real)0.04) /* SD of slips at one adhesion on the same ground */
 #define TG_CALM 30             /* s without either sign against it: forces agree, so the ground is another one */
 #define TG_BEYOND ((tg_real)9) /* square of the SDs beyond which that, and a slip, are no chance */
 
@@ -80,20 +81,26 @@ static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, 
     m->apart += share * (tgi_square(away) - m->apart);
 }
 
-/* Another dt without a ground speed: how likely it is the last slip still. */
+/* Another dt without a ground speed: how likely it is the last slip still, which was only as sure as the speeds were. */
 static tg_real go_unseen(tg_estimator *e, tg_real rim, tg_real dt)
 {
-    e->slip_memory.unseen += tgi_fabs(rim) * dt / e->constants.mean_radius;
-    return tgi_exp(-e->slip_memory.unseen / e->settings.tuned.uneven_memory);
+    tgi_slip_memory *const m = &e->slip_memory;
+    m->unseen += tgi_fabs(rim) * dt / e->constants.mean_radius;
+    return tgi_exp(-m->unseen / e->settings.tuned.uneven_memory) * m->apart / (m->apart + m->variance);
 }
 
-/* Ground speed along the travel at these rims and adhesion, with the usual slip there, and its variance: `error` is that of the slip apart
- * from what ground does to it. */
-static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real usual, tg_real keep, tg_real error, tg_real *variance)
+/* Variance of the slip that is remembered now, at this rim speed, by the speeds' own. */
+static void doubt_slip(tg_estimator *e, tg_real rim, tg_real variance)
+{
+    e->slip_memory.variance = variance / tgi_square(tgi_max(tgi_fabs(rim), 3 * e->settings.standstill_speed));
+}
+
+/* Ground speed along the travel at these rims and adhesion, with the usual slip there, and its variance. */
+static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real usual, tg_real keep, tg_real *variance)
 {
     const tgi_slip_memory *const m = &e->slip_memory;
     const tg_real last = slip_at(&e->settings.tuned, m->slip, m->adhesion, adhesion);
-    *variance = tgi_square(rim) * (error + (1 - keep) * (m->apart + keep * tgi_square(last - usual)));
+    *variance = tgi_square(rim) * (1 - keep) * (m->apart + keep * tgi_square(last - usual));
     return rim * (1 - usual - keep * (last - usual));
 }
 
@@ -136,16 +143,18 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     tg_real rim, adhesion, variance;
     means(e, NULL, drive, &rim, &adhesion);
     const tg_real keep = m->astray ? go_unseen(e, rim, since) : 1;
-    const tg_real usual = usual_at(e, adhesion), error = tgi_square(e->settings.tuned.slip_spread) + tgi_square(m->slip / 4);
-    const tg_real off = tgi_square(v - reckoned_at(e, rim, adhesion, usual, keep, error, &variance));
-    variance += e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
+    const tg_real usual = usual_at(e, adhesion), off = tgi_square(v - reckoned_at(e, rim, adhesion, usual, keep, &variance));
+    variance += tgi_square(rim) * (tgi_square(TG_STEADY_SLIP) + tgi_square(m->slip / 4)) + e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
     m->agreeing = off < variance && !m->contrary ? m->agreeing + since : 0;
     m->calm = m->unusual || m->contrary ? 0 : m->calm + since;
     const int32_t before = m->against > 0; /* one reading may be a spike */
     m->against = m->contrary || (m->unusual && off > TG_BEYOND * variance);
     if (m->against && before) m->astray = 1;
     else if (m->agreeing > TG_AGREED || m->calm > TG_CALM) m->astray = 0;
-    if (!m->astray) remember(e, rim, v, adhesion, usual, dt);
+    if (!m->astray) {
+        remember(e, rim, v, adhesion, usual, dt);
+        doubt_slip(e, rim, e->belief.P[(e->settings.machine.wheels + 1) * (tgi_stride(e->settings.machine.wheels) + 1)]);
+    }
     e->scene.astray = m->astray ? off + variance : 0;
 }
 
@@ -174,11 +183,12 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
     if (!goes) return;
     tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, rim, adhesion, variance;
     means(e, row, drive, &rim, &adhesion);
-    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), tgi_square(k->slip_spread), &variance);
+    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), &variance);
     variance += tgi_square((tg_real)0.01);
     e->scene.reckoned = variance;
     if (e->slope.running) {
         tgi_slope_correct(&e->slope, speed, variance * (1 + 2 * alike / dt));
+        e->scene.reckoned = tgi_max(variance, tgi_square(speed - e->slope.speed)); /* either may be wrong */
         speed = e->slope.speed;
         variance = e->slope.speed_variance;
         alike = k->carried_alike;
@@ -212,9 +222,8 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
     if (!is_missing(e, row, dt, silence) || e->speeds.seen[0] == 0 || e->speeds.open != 0) return;
     tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;
     if (!e->standing) {
-        const tg_real rim = rim_of_speeds(e, row), keep = go_unseen(e, rim, dt), error = tgi_square(keep) * e->slip_memory.variance;
-        const tg_real adhesion = e->settings.prior_adhesion;
-        speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), keep, error, &variance);
+        const tg_real rim = rim_of_speeds(e, row), adhesion = e->settings.prior_adhesion;
+        speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), &variance);
     }
     e->scene.reckoned = variance;
     row->value[TG_GROUND_SPEED] = speed;
@@ -227,5 +236,5 @@ void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt)
     const tg_real rim = rim_of_speeds(e, row), adhesion = e->settings.prior_adhesion;
     if (row->reckoned || isnan(row->value[TG_GROUND_SPEED])) return;
     remember(e, rim, (tg_real)e->direction * e->speeds.x[0], adhesion, usual_at(e, adhesion), dt);
-    e->slip_memory.variance = e->speeds.P[0][0] / tgi_square(tgi_max(tgi_fabs(rim), 3 * e->settings.standstill_speed));
+    doubt_slip(e, rim, e->speeds.P[0][0]);
 }

@@ -42,7 +42,6 @@ static tg_tuned default_tuned(void)
     k.silence = (tg_real)0.5;
     k.slip_memory = (tg_real)0.3;
     k.most_slope = (tg_real)0.4;
-    k.slip_spread = (tg_real)0.04;
     k.slip_apart = (tg_real)0.15;
     k.alike = (tg_real)0.1;
     k.carried_alike = (tg_real)0.1;

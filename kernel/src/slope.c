@@ -1,8 +1,9 @@
 /* Slope as the motion shows it, where there is an accelerometer: it reads dv/dt + g sin(slope), so what it reads beyond the change of
  * ground speed is slope. A pitch sensor alone errs by its mounting and by wheels that sink unevenly; without one the whole slope is
- * found. A Kalman filter of two states, ground speed and slope error, beside the main one (R). The effect of a whole slope's error on the
- * speed over a step is process noise of the main filter, which then weights ground speeds as this one does. The accelerometer's bias is
- * part of the slope error too, as it should be: the two then agree on dv/dt. */
+ * found, and where ground speeds disagree with the forces a sensed one may be as wrong: a pose in a map that is not level errs by the course
+ * (docs/decisions/0174-pitch-that-is-not-of-the-level.md). A Kalman filter of two states, ground speed and slope error, beside the main one
+ * (R). The effect of a whole slope's error on the speed over a step is process noise of the main filter, which then weights ground speeds as
+ * this one does. The accelerometer's bias is part of the slope error too, as it should be: the two then agree on dv/dt. */
 #include "estimator.h"
 
 #define TG_SLOPE_LIMIT ((tg_real)0.5) /* rad: no vehicle of ours drives steeper */
@@ -51,10 +52,11 @@ void tgi_slope_update(tg_estimator *e, const tg_row *row, tg_real pitch, tg_real
     const tg_settings *settings = &e->settings;
     const tg_real speed = row->value[TG_GROUND_SPEED];
     const int32_t sensed = e->pitch.count > 0;
-    const tg_real walk = sensed ? e->constants.mounting_walk : settings->tuned.terrain_walk * tgi_fabs(s->speed) / e->constants.mean_radius;
+    const tg_real unknown = sensed ? tgi_alike_share(e) : 1; /* a mounting is a constant, and considered */
+    const tg_real walk = (sensed ? e->constants.mounting_walk : 0) + unknown * settings->tuned.terrain_walk * tgi_fabs(s->speed) / e->constants.mean_radius;
     if (s->running && (dt > settings->gap || row->time - e->acceleration.time > 1)) s->running = 0;
     const tg_real drift_by_slope = s->running && dt > 0 ? predict(s, settings, pitch, walk, e->constants.force_walk, dt) : 0;
-    drive->drift_by_slope = sensed ? 0 : drift_by_slope; /* a mounting is a constant, and considered */
+    drive->drift_by_slope = unknown * drift_by_slope;
     if (!isnan(row->value[TG_ACCELERATION_X])) s->acceleration = row->value[TG_ACCELERATION_X];
     if (!isnan(speed)) {
         const tg_real noise = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED];

@@ -3,7 +3,7 @@
  * against its range. */
 #include "fields.h"
 
-#define TG_SNAPSHOT_VERSION 37u
+#define TG_SNAPSHOT_VERSION 38u
 
 typedef struct {
     char magic[8];

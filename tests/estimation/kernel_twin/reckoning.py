@@ -50,8 +50,8 @@ class Reckoning:
             return None
         rim = _mean(speeds, rims)
         self.unseen += abs(rim) * dt / self.radius
-        keep = np.exp(-self.unseen / UNEVEN)
-        spread = keep**2 * self.error + (1 - keep) * (self.apart + keep * (self.last - self.usual) ** 2)
+        keep = np.exp(-self.unseen / UNEVEN) * self.apart / (self.apart + self.error)
+        spread = (1 - keep) * (self.apart + keep * (self.last - self.usual) ** 2)
         return rim * (1 - self.usual - keep * (self.last - self.usual)), rim**2 * spread
 
     def remember(self, dt: float, v: float, variance: float, speeds: Floats, rims: Floats) -> None:
