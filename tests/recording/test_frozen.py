@@ -196,6 +196,23 @@ def test_a_load_cell_at_its_limit_torques_that_freeze_together_and_an_accelerome
     assert note.startswith("acceleration_x repeats")
 
 
+@pytest.mark.parametrize("value", [0.0, 0.013])
+@pytest.mark.parametrize("name", ["acceleration_x", "acceleration_y", "angular_velocity_z", "pitch"])
+def test_an_inertial_sensor_that_stops_is_named(name: str, value: float) -> None:
+    """An accelerometer that read 0 from the middle on said nothing: soil resistance held in 53 % of the rows."""
+    draws = np.random.default_rng(5)
+    sound = 0.02 * np.sin(TIME / 5) + 0.003 * draws.standard_normal(len(TIME))
+    (note,) = frozen_warnings(log(**{name: np.where(TIME > 120, value, sound)}))
+    assert note.startswith(f"{name} repeats {value:.4g} from ")
+    assert frozen_warnings(log(**{name: sound})) == []
+
+
+def test_a_pitch_in_coarse_steps_keeps_its_value_on_level_ground() -> None:
+    """Half a degree each, at 10 Hz."""
+    coarse = np.round(0.02 * np.sin(TIME / 60) / 0.0087) * 0.0087
+    assert frozen_warnings(log(pitch=coarse)) == []
+
+
 def test_wheels_that_hardly_ever_leave_0_do_not_change_while_a_speed_is_repeated() -> None:
     """The last digit of two dead sensors flickers."""
     rows = (TIME >= 20) & (TIME <= 30)

@@ -47,3 +47,12 @@ def test_the_noise_of_a_coarse_log_is_its_rounding() -> None:
         "uneven teeth" in note
         for note in unit_warnings(replace(result.recording, channels=coarse), result.vehicle)
     )
+
+
+def test_speeds_of_another_scale_are_no_noise() -> None:
+    """A motor's speed as a wheel's was said to have 'uneven teeth', too: 20 times the noise is 20 times the speed."""
+    result = machine(1)
+    motors = {n: 20 * v if n.startswith("wheel_speed") else v for n, v in result.recording.channels.items()}
+    notes = unit_warnings(replace(result.recording, channels=motors), result.vehicle)
+    assert any("times the ground speed: check units, gear ratio and radius" in note for note in notes)
+    assert not any("uneven teeth" in note for note in notes)

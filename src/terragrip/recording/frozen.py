@@ -40,8 +40,8 @@ _COMES = 10  # times to this value: a channel held or switched off there comes s
 
 
 def frozen_warnings(recording: Recording) -> list[str]:
-    """Sentences on a ground speed or an acceleration that never changes while the wheels do, and on speeds, torques and a drawbar force
-    that repeat a value for long, as a receiver does that lost its fix, or a logger whose bus went silent."""
+    """Sentences on a ground speed or an acceleration that never changes while the wheels do, and on speeds, torques, a drawbar force and
+    inertial sensors that repeat a value for long, as a receiver does that lost its fix, or a logger whose bus went silent."""
     speeds = {name: recording.channels[name] for name in speed_names(recording.channels)}
     ground = recording.channels.get("ground_speed")
     rims = [name for name in speeds if name != "ground_speed"]
@@ -65,8 +65,11 @@ def frozen_warnings(recording: Recording) -> list[str]:
     for name, force in forces.items():
         beside = [other for one, other in forces.items() if one != name]
         notes += _repeats(name, recording.time, force, beside, forces=True)
-    if acceleration is not None:
-        notes += _repeats("acceleration_x", recording.time, acceleration, _metric(speeds))
+    for name in ("acceleration_x", "acceleration_y", "angular_velocity_z", "pitch"):
+        values = recording.channels.get(name)
+        # only the first follows from the speeds' changes: the others need noise of their own
+        if values is not None and (name == "acceleration_x" or _is_restless(recording.time, values)):
+            notes += _repeats(name, recording.time, values, _metric(speeds))
     return notes + _together(recording, speeds)
 
 
@@ -146,7 +149,7 @@ def _repeats(
     name: str, time: Floats, values: Floats, others: list[Floats], *, forces: bool = False
 ) -> list[str]:
     """A sentence on the longest run of one value while others change much. Speeds may stay at 0; ``forces`` that are 0 may be
-    switched off, and at their limits be as great as they can."""
+    switched off, and at their limits be as great as they can; an accelerometer, a gyroscope or a pitch keeps no value."""
     when, what = known_part(time, values)
     if not others or not may_last(when, what) or is_one_value(what):
         return []
@@ -162,7 +165,7 @@ def _repeats(
             f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
             "one value. Log it in finer steps; of counted pulses, take the mean in a profile ('window: 1 s')."
         ]
-    usable = what[first] != 0.0
+    usable = (what[first] != 0.0) | (not forces and "speed" not in name)
     if forces and name != "drawbar_force":  # a motor is held at its limit, a load cell never
         usable &= (what[first] > what.min()) & (what[first] < what.max())
     long = (lasting >= max(LONG, _TIMES * usual)) & usable

@@ -247,7 +247,7 @@ _EACH = (
     ),
     Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
     Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means), _FORCES),
-    Check("rim noise", lambda log: noisy_rim_warnings(log.whole, log.vehicle), (*_TIME, "counted")),
+    Check("rim noise", lambda log: noisy_rim_warnings(log.whole, log.vehicle), (*_TIME, "counted", "rims")),
     Check(
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
