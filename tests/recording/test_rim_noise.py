@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from development_machine import machine
 from terragrip.recording import Recording, unit_warnings
-from terragrip.simulation import SimulationResult
+from terragrip.simulation import SimulationResult, families
 
 
 def toothed(result: SimulationResult, unevenness: float) -> Recording:
@@ -56,3 +57,17 @@ def test_speeds_of_another_scale_are_no_noise() -> None:
     notes = unit_warnings(replace(result.recording, channels=motors), result.vehicle)
     assert any("times the ground speed: check units, gear ratio and radius" in note for note in notes)
     assert not any("uneven teeth" in note for note in notes)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_wheels_at_5_hz_among_faster_channels_move_between_their_samples(held: bool) -> None:
+    """The rows of a log at 10 Hz were taken for the wheels' samples: right logs of three machines had 'uneven teeth'."""
+    kind = families.Kind("robot", "saturating", "multirate", "rolling")
+    result = families.draw(kind, 91007, rate=5.0, task="healthy")
+    log = result.recording
+    if held:
+        last = {
+            n: pd.Series(v).ffill().to_numpy() for n, v in log.channels.items() if n.startswith("wheel_speed")
+        }
+        log = log.with_channels(**last)
+    assert not any("uneven teeth" in note for note in unit_warnings(log, result.vehicle))

@@ -6,22 +6,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from terragrip.recording.lag import measured
 from terragrip.recording.noise import rounding_noise, sensor_noise
 from terragrip.recording.ranks import median
 from terragrip.recording.table import Recording
 from terragrip.vehicle import Vehicle
 
 _TWICE = 2.0  # the noise stated; 1.6 at most on 16 right machines at 10 Hz, 1.15 at 20 Hz
-_SLOWEST = 0.11  # s between rows: in longer ones a wheel's motion is no longer smooth
+_SLOWEST = 0.11  # s between a wheel's samples: in longer ones a wheel's motion is no longer smooth
 _PARTS, _ROWS = 4, 2500  # parts of a long log, each of so many rows, in which noise shows as well as in all
 
 
 def noisy_rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence on wheel speeds whose noise [rad/s] is over twice what the vehicle file states, of logs that are not coarser."""
     stated = vehicle.sensors.wheel_speed
-    rims = {n: v for n, v in recording.channels.items() if n.startswith("wheel_speed_")}
-    if stated is None or not rims or len(recording) < 2 or median(np.diff(recording.time)) > _SLOWEST:
+    known = {
+        n: measured(recording.time, v) for n, v in recording.channels.items() if n.startswith("wheel_speed_")
+    }
+    quick = [name for name, own in known.items() if own and median(np.diff(own[0])) <= _SLOWEST]
+    if stated is None or not quick:
         return []
+    rims = {name: recording.channels[name] for name in quick}
     part = replace(recording, channels=rims, labels={})
     if len(part) > _PARTS * _ROWS:
         begins = np.linspace(0, len(part) - _ROWS, _PARTS).astype(np.intp)
