@@ -99,7 +99,7 @@ def refused(place: Path, capsys: pytest.CaptureFixture[str]) -> Refused:
         (table().assign(ground_speed="fast"), ["ground_speed", "row 1", "'fast'"]),
         (with_cell("drive_torque_rl", "n/k"), ["drive_torque_rl", "row 101", "'n/k'"]),
         (table().assign(time=table()["time"].to_numpy()[::-1]), ["time goes back", "row 2"]),
-        (with_cell("time", 0.99), ["time repeats", "row 101"]),
+        (with_cell("time", 0.99).assign(mass=range(len(table()))), ["time repeats", "row 101"]),
         (with_cell("time", np.nan), ["column time", "row 101"]),
         (table().assign(ground_speed=np.nan), ["ground_speed", "no value"]),
         (with_cell("drawbar_force", np.inf), ["drawbar_force", "row 101", "infinite"]),

@@ -203,7 +203,7 @@ GOOD_ROWS = "0,1,5\n1,1,5\n"
         (HEAD + GOOD_ROWS + "2,1\n3,1,5\n", "row 3: has 2 cells, the header 3; give every row the same number of cells"),
         (HEAD + GOOD_ROWS + "2,1,5,6,7\n", "row 3: has 5 cells, the header 3"),
         (HEAD + GOOD_ROWS + "2,inf,5\n", "column ground_speed, row 3 (time 2 s): is infinite"),
-        (HEAD + GOOD_ROWS + "1,1,5\n", "column time, row 3 (time 1 s): time repeats"),
+        (HEAD + GOOD_ROWS + "1,2,5\n", "column time, row 3 (time 1 s): time repeats"),
         (HEAD + GOOD_ROWS + ",1,5\n", "column time, row 3: time is not a finite number"),
         ("time,groundspeed,wheel_speed_l\n" + GOOD_ROWS, "column ground_speed: is missing; the nearest column is 'groundspeed'"),
         ("t;v;w\n0;1;5\n", "column time: is missing; map the log's columns in a profile"),

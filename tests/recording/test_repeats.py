@@ -63,6 +63,23 @@ def test_rows_written_twice_change_nothing(rows: list[int]) -> None:
     assert [n for n in twice.notes if "repeat" in n] == [f"{len(rows)} {NOTE}"]
 
 
+@pytest.mark.parametrize("size", [50, 1000])
+def test_a_log_with_our_own_names_is_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    """`inspect` said 'merged with it', and `estimate` refused the log: time repeats."""
+    monkeypatch.setattr(parquet, "ROWS", size)
+    frame = log().drop(columns="field").set_axis(["time", "ground_speed", "wheel_speed_l"], axis=1)
+    path = tmp_path / "log.parquet"
+    doubled(frame, [0, 49, 50, 399]).to_parquet(path, row_group_size=70)
+    whole, blocks = read(path), list(recordings_of(parquet.parquet_on_disk(str(path))) or ())
+    pandas.testing.assert_frame_equal(whole.to_pandas(), read(frame).to_pandas())
+    parts = pd.concat([block.to_pandas() for block in blocks], ignore_index=True)
+    pandas.testing.assert_frame_equal(parts, whole.to_pandas())
+    assert f"4 {NOTE}" in whole.notes
+    assert f"4 {NOTE}" in blocks[-1].notes
+
+
 def test_a_row_for_each_message_makes_one_row() -> None:
     """The others' cells are empty, so that nothing is lost; a column that nobody asked for may count the messages."""
     frame = log()

@@ -60,7 +60,8 @@ def recordings_of(log: TableOnDisk, profile: Profile | None = None) -> Iterator[
     table = LogTable(log.names, {}, log.units, log.source, log.digest, clocked=log.clocked)
     if profile is None:
         chosen = [name for name in log.names if is_own(name)]
-        based = _with_time_base(log, log.read(chosen), table, Stamps(TIME, log.units.get(TIME, "s")))
+        rows = _one_row_an_instant(log, log.read(chosen), TIME)
+        based = _with_time_base(log, rows, table, Stamps(TIME, log.units.get(TIME, "s")))
         own = (replace(block, columns=in_si(block)) for block in based)
         return aligned(_checked(log, own, log.names, chosen))
     result = settled(profile, table)

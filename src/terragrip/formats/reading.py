@@ -21,6 +21,7 @@ from terragrip.recording import Recording, checks
 from terragrip.recording.alignment import aligned
 from terragrip.recording.columns import seconds, start_of
 from terragrip.recording.frames import frame_of
+from terragrip.recording.repeats import merged
 from terragrip.recording.schema import TIME, is_own
 
 PathLike = str | os.PathLike[str]
@@ -53,7 +54,7 @@ def read(
         return _of_frame(path, profile)
     databases: Databases = (dbc,) if isinstance(dbc, str | os.PathLike) else tuple(dbc)
     if not isinstance(path, str | os.PathLike):
-        from terragrip.formats.sources import merged
+        from terragrip.formats import sources
 
         several = hasattr(path, "__iter__") and not (
             isinstance(path, bytes | Recording) or hasattr(path, "read")
@@ -67,7 +68,9 @@ def read(
                 raise InputError(
                     f"{type(one).__name__} is no log", hint="give a path, a DataFrame or a dict of arrays"
                 )
-        recording = merged([_part(p, own, databases) for p, own in zip(paths, chosen_ones, strict=True)])
+        recording = sources.merged(
+            [_part(p, own, databases) for p, own in zip(paths, chosen_ones, strict=True)]
+        )
         used = {id(own): own.to_dict() for own in chosen_ones if own is not None}
         return replace(recording, profiles=tuple(used.values()))
     if isinstance(profile, list | tuple):
@@ -210,8 +213,10 @@ def _part(
 
 
 def _timed(table: LogTable) -> LogTable:
-    """A table with our own names, its stamps a time base."""
-    return Stamps(TIME, table.units.get(TIME, "s")).corrected(table)
+    """A table with our own names, its stamps a time base, with a row for each."""
+    table = Stamps(TIME, table.units.get(TIME, "s")).corrected(table)
+    columns, repeats = merged(table.columns, TIME)
+    return replace(table, columns=columns, notes=(*table.notes, *repeats.notes()))
 
 
 def _require(table: LogTable) -> None:
