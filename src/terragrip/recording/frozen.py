@@ -68,7 +68,9 @@ def frozen_warnings(recording: Recording) -> list[str]:
     for name in ("acceleration_x", "acceleration_y", "angular_velocity_z", "pitch"):
         values = recording.channels.get(name)
         # only the first follows from the speeds' changes: the others need noise of their own
-        if values is not None and (name == "acceleration_x" or _is_restless(recording.time, values)):
+        if values is None or not np.isfinite(values).any():
+            continue
+        if name == "acceleration_x" or _is_restless(recording.time, values):
             notes += _repeats(name, recording.time, values, _metric(speeds))
     return notes + _together(recording, speeds)
 
