@@ -331,7 +331,7 @@ def test_what_a_log_contradicted_is_said_of_its_soils(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It stood in the estimates' summary alone, which nobody sees of a batch."""
-    note = "drive_torque_fl (0) never changes while the vehicle drives: the sensor is dead, or the column is wrong."
+    note = "drive_torque_fl (0) never changes while the vehicle drives: the sensor is dead, or the column is wrong, or its motor is off."
     usual = NOTHING_TOWED
     paths = [tmp_path / f"run{k}.parquet" for k in range(7)]
     for k, path in enumerate(paths):

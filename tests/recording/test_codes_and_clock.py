@@ -88,6 +88,16 @@ def test_a_code_for_no_value_is_named_alone(name: str, code: float) -> None:
     assert "'invalid: [...]' in the profile" in note
 
 
+def test_one_code_in_many_channels_is_one_sentence() -> None:
+    """A logger's -9999 in all 17 channels gave 17 lines, and two on a latitude and a longitude that 'must be in degrees'."""
+    sound = drive()
+    rows = np.random.default_rng(3).random(len(sound["time"])) < 0.01
+    (note,) = notes_on({n: v if n == "time" else np.where(rows, -9999.0, v) for n, v in sound.items()})
+    first = [name for name in sound if name != "time"][:6]
+    assert note.startswith(", ".join(first))
+    assert "and 6 more are -9999 in some rows: a code for 'not measured'" in note
+
+
 @pytest.mark.parametrize(
     ("name", "value"), [("drive_torque_rr", 300.0), ("drawbar_force", 6000.0), ("ground_speed", 12.0)]
 )

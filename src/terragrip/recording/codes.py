@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.checks import PLACES
 from terragrip.recording.held import known_part, quantum
 from terragrip.recording.noise import MAD_TO_SD
 from terragrip.recording.ranks import median
@@ -24,6 +25,7 @@ _FASTEST = 100.0  # m/s
 _LIMITS = {
     "pitch": 7.0,
     "roll": 7.0,  # rad: more than a turn
+    **PLACES,
     **{f"acceleration_{axis}": 500.0 for axis in "xyz"},
     **{f"angular_velocity_{axis}": 50.0 for axis in "xyz"},
 }
@@ -40,8 +42,9 @@ _SLOWEST = 0.15  # s between samples: within more a machine may stop and go
 
 
 def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Recording, list[str]]:
-    """The recording with such values missing, and a sentence on each channel that had some."""
-    channels, notes = {}, []
+    """The recording with such values missing, and a sentence on each code."""
+    channels: dict[str, Floats] = {}
+    found: dict[str, list[tuple[str, str]]] = {}
     for name, values in recording.channels.items():
         limit = _limit(name, vehicle)
         if limit is None:
@@ -60,11 +63,22 @@ def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Record
             if beyond
             else f"(the first at {moment(recording.time[np.argmax(bad)])} s), and leaps there and back"
         )
-        notes.append(
-            f"{name} is {shown} in {bad.sum()} rows {seen}: a code for "
-            f"'not measured', it seems. Leave these cells empty, or write 'invalid: [...]' in the profile, in the log's own numbers."
-        )
+        found.setdefault(shown, []).append((name, f"is {shown} in {bad.sum()} rows {seen}"))
+    notes = [_sentence(shown, each) for shown, each in found.items()]
     return (replace(recording, channels={**recording.channels, **channels}) if channels else recording), notes
+
+
+def _sentence(shown: str, each: list[tuple[str, str]]) -> str:
+    """On the channels that have one code, each with what it looks like there."""
+    names = [name for name, _ in each]
+    text = f"{names[0]} {each[0][1]}"
+    if len(each) > 1:
+        more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+        text = f"{', '.join(names[:6])}{more} are {shown} in some rows"
+    return (
+        f"{text}: a code for 'not measured', it seems. Leave these cells empty, or write 'invalid: [...]' in the profile, in the log's own "
+        "numbers."
+    )
 
 
 def _limit(name: str, vehicle: Vehicle | None) -> float | None:

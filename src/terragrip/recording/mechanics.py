@@ -361,7 +361,8 @@ def _dead_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         if still and (len(still) < len(held) or lost):
             shown = " and ".join(f"{name} ({value:.3g})" for name, value in still.items())
             verb = "change" if len(still) > 1 else "changes"
-            else_ = ", or the vehicle only coasts or is towed" if lost and len(still) == len(held) else ""
+            else_ = ", or its motor is off" if quantity == "drive_torque" and not any(still.values()) else ""
+            else_ = ", or the vehicle only coasts or is towed" if lost and len(still) == len(held) else else_
             notes.append(
                 f"{shown} never {verb} while the vehicle drives: the sensor is dead, or the column is wrong{else_}."
             )
