@@ -234,3 +234,14 @@ def test_all_shows_the_whole_of_a_curve_above_the_points(page: Any, served: Serv
         });
         return tops.length > 2 && tops.every((top) => top > 0 && top < y.high);
     }""")
+
+
+def test_a_fit_without_points_is_asked_for_them_until_there_are_some(page: Any, served: Served) -> None:
+    """'Choose a soil ... first' stayed over the points and their fit until it was dismissed."""
+    page.goto(f"{served.url}/#/fit")
+    page.click("text=Add a curve")
+    page.click("#fit-button")
+    page.wait_for_selector(".note.error:has-text('Choose a soil, or digitise a line')")
+    page.select_option("#soil-file", "estimates.parquet")
+    page.wait_for_selector("#soil-list li")
+    page.wait_for_selector(".note.error:has-text('Choose a soil')", state="detached")

@@ -193,3 +193,9 @@ def test_a_profiles_choice_is_shown_by_its_names_and_nothing_of_a_larger_one(
     for more in ("rows: {column: x, equals: y}", "channels: nothing"):  # saved again, it would lose the rows
         (folder / "mine.yaml").write_text(f"{text}{more}\n")
         assert client.get("/api/columns", params=query).json()["kept"] is None
+    (folder / "mine.yaml").write_text("channels:\n  ground_speed: {from: v\n  mass: x\n")
+    found = client.get("/api/columns", params=query).json()
+    assert found["kept"] is None
+    assert found["unread"].startswith(
+        "mine.yaml: line 3: not YAML: "
+    )  # "has more than a choice of columns", it was said

@@ -1,8 +1,15 @@
 /** Fits by the server, and the points that they use. */
 
 import { send } from "../ui/api";
-import { note, tried } from "../ui/notes";
+import { note, tried, withdraw } from "../ui/notes";
 import type { Curve, FitResult, Soil, State } from "./state";
+
+const NO_POINTS = "Choose a soil, or digitise a line of a picture, first.";
+
+/** Withdraw what a fit without points had said, once there are some. */
+export function noteOfPoints(state: State): void {
+  if (points(state)) withdraw(NO_POINTS);
+}
 
 /** Fit the active curve to the chosen points; from where it is (`here`), or from the starts that the server tries. */
 export async function fit(state: State, here = false): Promise<void> {
@@ -10,7 +17,7 @@ export async function fit(state: State, here = false): Promise<void> {
   if (!curve) return;
   const data = points(state);
   if (!data) {
-    note("Choose a soil, or digitise a line of a picture, first.", "error");
+    note(NO_POINTS, "error");
     return;
   }
   const before = curve.fit;

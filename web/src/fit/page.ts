@@ -5,7 +5,7 @@ import { h, save } from "../ui/dom";
 import { note, tried } from "../ui/notes";
 import { oneAtATime, type Page } from "../ui/page";
 import { CurvesPanel } from "./curves_panel";
-import { fit, fitEach } from "./fitting";
+import { fit, fitEach, noteOfPoints } from "./fitting";
 import { ListPanel } from "./list_panel";
 import { mapOf } from "./picture";
 import { PicturesPanel } from "./pictures_panel";
@@ -46,6 +46,7 @@ export const page: Page = (main, { notices, query }) => {
   loupe.wanted = () => pictures.isDigitising;
   plot.onClick = (at, shift) => pictures.click(at, shift);
   state.on(() => {
+    noteOfPoints(state);
     undo.disabled = !state.canUndo;
     redo.disabled = !state.canRedo;
   });

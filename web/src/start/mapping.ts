@@ -30,6 +30,7 @@ interface Channel {
 
 export interface Preview {
   kept: { time?: Entry; channels: Record<string, Entry> } | null; // what a profile chose
+  unread: string; // why it cannot be read
   rows: number;
   ready: boolean;
   fitting: string[];
@@ -133,7 +134,8 @@ export class Mapping {
     this.wheels = [...new Set(this.preview.channels.map((channel) => channel.wheel).filter(Boolean))];
     if (!this.wheels.length && !this.chosen.has("wheel_based_speed")) this.addWheels(["fl", "fr", "rl", "rr"]);
     if (kept?.time) this.preview.time = kept.time;
-    const hint = this.profile ? `The choice saved in ${this.profile}.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”.";
+    const { unread } = this.preview;
+    const hint = this.profile ? `The choice saved in ${this.profile}.` : unread ? `${unread}. These are the proposals.` : profile ? `${profile} has more than a choice of columns. These are the proposals.` : "Assign the columns. The likeliest is chosen, with its reason; check those marked “?”.";
     this.began = this.state();
     const unsaved = this.takeUp(this.preview);
     this.names.of(this.preview.channels);

@@ -32,16 +32,18 @@ def columns_of(studio: Here, path: Named, vehicle: str = "", profile: str = "") 
     """What a log holds, with an outline of each column, and what each channel may be made of, the likeliest first.
 
     With a vehicle its wheels are among the channels, whether a column looks like theirs or not. With a profile the channels have the
-    names that it gives them, and ``kept`` is its choice, `time` and `channels`; null where it has more than a choice of columns.
+    names that it gives them, and ``kept`` is its choice, `time` and `channels`; null where it has more than a choice of columns, or
+    cannot be read, which ``unread`` says.
     """
     from terragrip.vehicle import Vehicle
 
     look = studio.logs.get(studio.folder.file(path))
     wheels = tuple(Vehicle.load(studio.folder.file(vehicle)).wheels) if vehicle else ()
-    kept = _choice(studio.folder.profile(profile)) if profile else None
+    kept, unread = _choice(studio, profile) if profile else (None, "")
     return finite(
         {
             "kept": kept,
+            "unread": unread,
             "rows": look.inspection.rows,
             "ready": look.inspection.ready,
             "fitting": look.inspection.fitting,
@@ -87,17 +89,18 @@ def save_profile(studio: Here, wanted: ProfileRequest) -> dict[str, str]:
     return {"path": wanted.output, "text": text}
 
 
-def _choice(profile: str) -> dict[str, Any] | None:
-    """A profile's `time` and `channels`; None where `save_profile` would lose something of it."""
+def _choice(studio: Here, profile: str) -> tuple[dict[str, Any] | None, str]:
+    """A profile's `time` and `channels`, None where `save_profile` would lose something of it; and why it cannot be read, if so."""
     from terragrip.formats import Profile
 
+    path = studio.folder.profile(profile)
     try:
-        whole = Profile.load(profile).to_dict()
-    except InputError:  # said where the log is read by it
-        return None
+        whole = Profile.load(path).to_dict()
+    except InputError as error:
+        return None, str(error).replace(path, profile)
     time = set(whole.get("time", ()))
     plain = {"channels"} <= set(whole) <= {"time", "channels"} and time <= {"from", "unit", "zero"}
-    return whole if plain else None
+    return (whole if plain else None), ""
 
 
 def _read_some(log: Path, profile: Path) -> None:
