@@ -208,3 +208,13 @@ def test_nothing_to_calibrate_from_and_foreign_logs_are_refused(drive: Make, veh
     channels = {name.replace("_fl", "_xx"): values for name, values in log.channels.items()}
     with pytest.raises(InputError, match="no wheel xx"):
         calibrate(Recording(log.time, channels), vehicle)
+
+
+def test_of_an_impossible_bias_no_pitch_is_left(drive: Make, vehicle: Vehicle) -> None:
+    """A logger's -9999 in single rows: a bias of -329 m/s² was refused, and a pitch_offset of .44 rad was written."""
+    log = inclined(drive, 0.1, 0.01)
+    rows = np.arange(len(log)) % 97 == 0
+    codes = {n: np.where(rows, -9999.0, log[n]) for n in ("acceleration_x", "pitch")}
+    result = calibrate(log.with_channels(**codes), vehicle)
+    assert not {"acceleration_bias_x", "pitch_offset"} & {quantity.name for quantity in result.quantities}
+    assert any("is impossible" in one.why for one in result.unknown)

@@ -161,10 +161,13 @@ def _zeros(
     noise, standing = _sensor_noise(logs, vehicle), windows(logs, vehicle, zeros.WINDOW)
     quantities: list[Quantity] = []
     unknown: list[Unknown] = []
+    level, without = zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"])
+    if len(_possible(level, vehicle, unknown)) < len(level):
+        level = []  # they are the parts of one difference
     for zeroed, missing in (
         zeros.torque_zeros(standing, vehicle, sources, noise["drive_torque"]),
         zeros.drawbar_zero(standing, vehicle, sources, noise["drawbar_force"]),
-        zeros.inclination_zeros(standing, vehicle, sources, noise["acceleration"]),
+        (level, without),
     ):
         unknown += missing
         quantities += _accepted(zeroed, vehicle, unknown)
