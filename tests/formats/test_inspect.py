@@ -378,6 +378,22 @@ def test_a_wheel_without_a_torque_is_held_against_the_vehicle_file(
     assert bool(said) is bool(expected)
 
 
+@pytest.mark.parametrize("driven", [True, False])
+def test_a_driven_wheel_without_a_speed_is_held_against_the_vehicle_file(
+    tmp_path: Path, driven: bool
+) -> None:
+    """Of a robot with two wheels in line, f and r, 'w_r' was the right wheel's speed and nothing was said of f; `estimate` refuses that."""
+    frame = pd.DataFrame({"time": 0.1 * np.arange(50), "gps_speed": 1.0 + 0.1 * np.sin(np.arange(50))})
+    for wheel in "fr":
+        frame[f"w_{wheel}"], frame[f"T_{wheel}"] = 3 * frame["gps_speed"], 10 + ramp(3)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    axles = {"front": {"mass": 50, "wheels": ["f"], "driven": driven}, "rear": {"mass": 50, "wheels": ["r"]}}
+    shape = {"wheelbase": 1.0, "center_of_gravity_height": 0.3, "wheel": {"radius": 0.3, "inertia": 0.1}}
+    vehicle = Vehicle.from_dict({"mass": 100, "axles": axles, **shape})
+    missing = inspect(tmp_path / "log.csv", vehicle=vehicle).missing
+    assert any(one.startswith("No wheel speed is recognised for wheel f") for one in missing) is driven
+
+
 def test_a_remark_of_numbers_that_ends_in_words_is_left_alone(tmp_path: Path) -> None:
     """A block of a long file takes it for numbers, the next for texts."""
     rows = [f"{0.01 * k:.2f},1.0{k % 7},5.0{k % 9},3" for k in range(100_000)]

@@ -42,6 +42,12 @@ def missing_channels(
         notes += _without_order(columns)
     if "ground_speed" not in proposals:
         notes.append("No ground speed is recognised: slip and resistance need it; positions will do.")
+    if wheels and vehicle is not None:
+        notes += [
+            f"No wheel speed is recognised for wheel {wheel} of the vehicle file, which is driven: name its column in a profile."
+            for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True)
+            if driven and wheel not in wheels
+        ]
     return [*notes, *_missing_forces(proposals, wheels, vehicle)] if turns else notes
 
 
