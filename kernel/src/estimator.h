@@ -156,7 +156,7 @@ struct tg_estimator {
     double last_raw_time[TG_SLOTS];
     tg_hold torque[8], drawbar, pitch, axle_load[8], mass, hitch_load;
     tg_hold wheel[8], ground;  /* speeds */
-    tg_hold forward;           /* acceleration */
+    tg_hold forward, turn;     /* acceleration, yaw rate */
     tgi_own_time own_time[8];      /* see wheels.c */
     int32_t rolls;             /* bits: a free wheel whose speed was never measured, which goes as its hub does */
     int32_t shared[8];         /* wheel: samples in a row in which its torque was another's of its axle, see doubt.c, */

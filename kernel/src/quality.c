@@ -106,6 +106,16 @@ static void roll_along(tg_estimator *e, tg_row *row)
     }
 }
 
+/* A jump of the yaw rate by more than a vehicle can do, which hubs and slips would follow, is left out until the next sample confirms it. */
+static int32_t doubt_turn(tg_estimator *e, tg_row *row)
+{
+    tg_hold *const h = &e->turn;
+    tgi_hold_update(e, h, row, TG_YAW_RATE, e->constants.agility[TG_GROUND_SPEED] / tgi_max(e->constants.outermost, e->constants.mean_radius));
+    if (!(h->spike > 0 && h->time == row->time)) return 0;
+    row->value[TG_YAW_RATE] = (tg_real)NAN;
+    return 1;
+}
+
 /* Calibrated row with NaN for whatever is no measurement. The estimator is changed only when all numbers are finite or NaN. */
 tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
 {
@@ -122,6 +132,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
         if (c->limit[k] > 0 && isinf(sample->value[k])) return TG_NOT_FINITE;
     row->time = sample->time;
     if (c->holds) drop_repetitions(e, sample, row);
+    outlier |= doubt_turn(e, row);
     move_to_middle(e, row);
     if (e->rolls) roll_along(e, row);
     for (int32_t k = TG_WHEEL_SPEED; k <= TG_GROUND_SPEED; k++) measured |= row->value[k] == row->value[k];

@@ -3,7 +3,7 @@
  * against its range. */
 #include "fields.h"
 
-#define TG_SNAPSHOT_VERSION 38u
+#define TG_SNAPSHOT_VERSION 39u
 
 typedef struct {
     char magic[8];
