@@ -3,7 +3,6 @@
  * ahead: what the vehicle usually slips, and how far from that it was while this was measured, take its place. */
 #include "estimator.h"
 
-#define TG_DRAWN 2             /* s over which it is summed what ground speeds draw the estimate by */
 #define TG_AGREED 5            /* s that speed, forces and wheels agree again: a drift may pass through what they agree on */
 #define TG_STEADY_SLIP ((tg_real)0.04) /* SD of slips at one adhesion on the same ground */
 #define TG_CALM 30             /* s without either sign against it: forces agree, so the ground is another one */
@@ -104,11 +103,11 @@ static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion,
     return rim * (1 - usual - keep * (last - usual));
 }
 
-/* After a ground speed: its innovation, the variance of that, and the gain. */
+/* After a ground speed: its innovation, the variance of that, and the gain. What it drew the estimate by is summed over a gap's time. */
 void tgi_watch_draw(tg_estimator *e, tg_real innovation, tg_real variance, tg_real gain)
 {
     tgi_slip_memory *const m = &e->slip_memory;
-    const tg_real since = tgi_max(e->ground.interval, (tg_real)1e-3), leak = since / (TG_DRAWN + since), chance = tgi_square(gain) * variance / (2 * leak);
+    const tg_real since = tgi_max(e->ground.interval, (tg_real)1e-3), leak = since / (e->settings.gap + since), chance = tgi_square(gain) * variance / (2 * leak);
     m->drawn += gain * innovation - leak * m->drawn;
     const tg_real most = TG_BEYOND * tgi_max(m->draws, chance), square = tgi_square(m->drawn);
     m->unusual = square > most;
