@@ -6,10 +6,11 @@
 
 #define TG_FASTER ((tg_real)1.5) /* times as often as the wheel's speed is its torque measured: not by chance */
 
-/* What the speed moves by, mean square, in the time since its last sample. */
+/* What the speed moves by, mean square, in the time since its last sample; in a first start, what a vehicle is capable of. */
 static tg_real moved_since(const tg_estimator *e, int32_t i, tg_real age)
 {
     const tg_hold *const h = &e->wheel[i];
+    if (h->count < 2) return tgi_square(e->constants.agility[TG_WHEEL_SPEED + i] * age);
     return tgi_motion(h, e->settings.noise[TG_WHEEL_SPEED + i]) * age / h->interval;
 }
 
@@ -30,7 +31,7 @@ void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
         tgi_own_time *const p = &e->own_time[i];
         const tg_real age = (tg_real)(row->time - h->time);
         const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
-        const int32_t between = goes && missing && h->count > 1;
+        const int32_t between = goes && missing && h->interval > 0;
         const int32_t steady = between && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
         const int32_t waits = between && !steady;
         e->scene.since_sample[i] = waits ? moved_since(e, i, age) : 0;

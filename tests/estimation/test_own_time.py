@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -84,3 +85,15 @@ def test_between_its_samples_a_wheel_waits_and_grows_unsure() -> None:
     assert deviations == sorted(deviations)
     steps = np.diff(estimates["wheel_speed_rr"])[(rows[1:] > 200) & (rows[1:] % 4 != 0)]
     assert np.abs(steps).max() < 1e-3
+
+
+def test_a_wheel_without_a_sample_in_the_first_row_of_motion_waits_for_it() -> None:
+    """A log at 3 Hz: it ran by its torque alone, to more than 100 rad/s; what it may do meanwhile is what a vehicle is capable of."""
+    starts = drive(8.0, rate=3.0, speed=lambda t: np.where(t < 3, 0.0, 0.6), noise=0.0).recording
+    first = int(np.argmax(starts["wheel_speed_fl"] > 0.5))
+    missing = starts["wheel_speed_fl"].copy()
+    missing[first] = np.nan
+    estimates = tg.estimate(replace(starts, channels=starts.channels | {"wheel_speed_fl": missing}), robot())
+    error = estimates["wheel_speed_fl"][first] - starts["wheel_speed_fl"][first]
+    assert abs(error) < 5
+    assert abs(error) < 1.96 * estimates["wheel_speed_fl_std"][first]
