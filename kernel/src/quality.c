@@ -106,12 +106,14 @@ static void roll_along(tg_estimator *e, tg_row *row)
     }
 }
 
-/* A jump of the yaw rate by more than a vehicle can do, which hubs and slips would follow, is left out until the next sample confirms it. */
+/* A jump of the yaw rate by more than a vehicle can do, which hubs and slips would follow, is left out until the next sample confirms it,
+ * or goes on beyond it: a small machine may turn faster than that. */
 static int32_t doubt_turn(tg_estimator *e, tg_row *row)
 {
     tg_hold *const h = &e->turn;
+    const tg_real jump = h->spike > 0 ? h->raw - h->calm : 0, further = row->value[TG_YAW_RATE] - h->raw;
     tgi_hold_update(e, h, row, TG_YAW_RATE, e->constants.agility[TG_GROUND_SPEED] / tgi_max(e->constants.outermost, e->constants.mean_radius));
-    if (!(h->spike > 0 && h->time == row->time)) return 0;
+    if (!(h->spike > 0 && h->time == row->time) || jump * further > 0) return 0;
     row->value[TG_YAW_RATE] = (tg_real)NAN;
     return 1;
 }

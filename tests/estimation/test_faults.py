@@ -434,6 +434,22 @@ def test_a_spike_of_the_gyroscope_is_no_turn():
     assert np.abs(spiky["slip_fl"] - plain["slip_fl"])[2001] > 0.1
 
 
+def test_a_robot_that_turns_faster_than_its_ground_speed_may_change_is_no_spike():
+    """20 rad/s² of a robot of .55 m track, for .07 s: each sample was left out until the turn was steady; slip .045 off (RMS), now .019."""
+    base = drive(40.0, noise=0.0).recording
+    phase = base.time % 4 - 2
+    yaw = 1.5 * np.clip(np.minimum(phase, 1.075 - phase) / 0.075, 0, 1) * np.where(base.time % 8 < 4, 1, -1)
+    measured = yaw + 0.005 * np.random.default_rng(0).standard_normal(len(base))
+    channels = {**base.channels, "angular_velocity_z": measured}
+    for wheel, left in (("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)):
+        channels[f"wheel_speed_{wheel}"] = base[f"wheel_speed_{wheel}"] * (
+            1 - left * 0.277 * yaw / base["ground_speed"]
+        )
+    estimates, straight = run(Recording(base.time, channels)), run(base)
+    off = [(estimates[f"slip_{w}"] - straight[f"slip_{w}"])[base.time > 10] for w in WHEELS]
+    assert np.sqrt(np.mean(np.square(off))) < 0.03
+
+
 values = st.one_of(
     st.just(math.nan), st.floats(-3, 3), st.floats(-1e3, 1e3), st.floats(-1e12, 1e12), st.sampled_from([0.0, 1e300, -1e300])
 )  # fmt: skip
