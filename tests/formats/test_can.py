@@ -567,3 +567,22 @@ def test_two_buses_without_numbers_of_their_own_are_two(
     speeds = [read.signals[name].values for name in read.names if name.startswith("speed@")]
     assert sorted(float(values.max()) for values in speeds) == [0.0, pytest.approx(SENT.max(), abs=0.006)]
     assert any(f"{names[0]} is bus " in note for note in read.notes)
+
+
+@pytest.mark.parametrize("form", ["candump", "table"])
+def test_which_bus_speaks_first_changes_no_number(tmp_path: Path, form: str) -> None:
+    """A profile made of a log whose left bus came first had left and right exchanged in one that began with the right one."""
+    (tmp_path / "machine.dbc").write_text(BUSES.format(at=(0, 16), order=1))
+    numbers = []
+    for names in (("left", "right", "can1"), ("right", "can1", "left")):
+        lines = ["time,bus,id,data"] if form == "table" else []
+        for k, bus in enumerate(names * 30):
+            stamp, data = f"{START + 0.01 * k:.6f}", struct.pack("<hhxxxx", 100 * len(bus), 0).hex()
+            lines.append(f"{stamp},{bus},100,{data}" if form == "table" else f"({stamp}) {bus} 100#{data}")
+        log = tmp_path / ("log.csv" if form == "table" else "log.log")
+        log.write_text("\n".join(lines) + "\n")
+        read = read_log(log, databases=(str(tmp_path / "machine.dbc"),))
+        numbers.append({n: float(read.signals[n].values[0]) for n in read.names if "@" in n})
+        assert "Buses: can1 is bus 1, left is bus 0, right is bus 2." in read.notes
+    assert len(numbers[0]) >= 3
+    assert numbers[0] == numbers[1]

@@ -111,9 +111,11 @@ def test_messages_that_come_late_by_a_row_are_sorted(
     )
 
 
-def test_a_clock_that_was_set_back_is_no_message_that_comes_late() -> None:
+@pytest.mark.parametrize("steps", [1.1, 1.5, 2.4, 9.0])
+def test_a_clock_that_was_set_back_is_no_message_that_comes_late(steps: float) -> None:
+    """By one to three steps, 1.5 s of a log at 1 Hz, two runs of the clock were sorted into one another."""
     frame = log()
-    frame.loc[200:, "t"] -= 0.09
+    frame.loc[200:, "t"] -= steps * (frame["t"][1] - frame["t"][0])
     with pytest.raises(InputError, match="time goes back"):
         PLAIN.apply(frame)
 

@@ -14,7 +14,10 @@ from terragrip.recording.columns import label_of
 
 Column = npt.NDArray[Any]
 LATE = 3
-"""Places by which a message may come after later ones. A clock that was set back moves more rows, and is refused."""
+"""Places by which a message may come after later ones. A clock that was set back moves more rows or leaves short steps, and is refused."""
+_SHORT = (
+    0.75  # of the shortest other step: a clock set back by one to three of them leaves half of one at most
+)
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,17 @@ def _in_order(columns: Mapping[str, Column], stamp: str) -> tuple[Mapping[str, C
         return columns, 0
     order = np.argsort(stamps, kind="stable")
     moved = order - np.arange(len(order))
-    if np.abs(moved).max() > LATE:
+    if np.abs(moved).max() > LATE or _was_set_back(np.diff(stamps[order]), moved != 0):
         return columns, 0
     return {name: column[order] for name, column in columns.items()}, int((moved > 0).sum())
+
+
+def _was_set_back(steps: Column, moved: Bools) -> bool:
+    """Whether sorted rows (n,) of which some ``moved`` are closer to one another there than rows are anywhere else: two runs of a clock."""
+    goes_on = steps.astype(bool)
+    there = (moved[1:] | moved[:-1])[goes_on]
+    steps = steps[goes_on]
+    return 0 < there.sum() < len(steps) and bool(steps[there].min() < _SHORT * steps[~there].min())
 
 
 def _known(column: Column) -> Bools:

@@ -66,6 +66,13 @@ def bus_of(name: str, known: dict[str, int]) -> int | None:
     return known.get(name)
 
 
+def number_buses(names: Iterable[str], known: dict[str, int]) -> None:
+    """Number the buses of a log's head by `bus_of`, those with a number of their own first, else by name: which one speaks first differs
+    from log to log of one machine, and a profile goes by the number."""
+    for name in sorted(names, key=lambda name: (not name[-1:].isdecimal(), name)):
+        bus_of(name, known)
+
+
 def with_buses(identifiers: Ints, buses: npt.NDArray[Any]) -> Ints:
     """Identifiers (n,), each with the number of its frame's bus."""
     return identifiers | (buses.astype(np.int64) + 1) << _BUS

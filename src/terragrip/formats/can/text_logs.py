@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from terragrip.formats.boundary import DAMAGE, needed
-from terragrip.formats.can.catalog import EXTENDED, bus_of, on_bus
+from terragrip.formats.can.catalog import EXTENDED, bus_of, number_buses, on_bus
 from terragrip.formats.can.frames import Frame, Frames
 
 Numbered = tuple[int, str]
@@ -112,7 +112,9 @@ def candump(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Fram
     """
     lines = iter(lines)
     head = list(itertools.islice(lines, _HEAD))
-    stamps = [stamp for stamp, _, _ in _candump(enumerate(head), Count(), None)]
+    first = Count()
+    stamps = [stamp for stamp, _, _ in _candump(enumerate(head), first, None)]
+    number_buses(first.buses, count.buses)
     back = sum(after < before for before, after in itertools.pairwise(stamps))
     numbered = enumerate(itertools.chain(head, lines), 1)
     if len(stamps) < 3 or back < _BACK * len(stamps) or max(stamps) > _LONGEST_STEP:
@@ -260,7 +262,12 @@ def table(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]
     """Frames of a table with time, identifier (or pgn and source) and data columns; a line that holds none is counted."""
     numbered = ((number, line) for number, line in enumerate(lines, 1) if line.strip())
     separator, names = _cells(next(numbered, (0, ""))[1])
-    for number, line in numbered if _is_frame_header(names) else ():
+    head = list(itertools.islice(numbered, _HEAD))
+    at = next((names.index(name) for name in _BUSES if name in names), len(names))
+    number_buses(
+        {cell.strip() for _, line in head for cell in line.split(separator)[at : at + 1]}, count.buses
+    )
+    for number, line in itertools.chain(head, numbered) if _is_frame_header(names) else ():
         if frames.leaves_out_next():
             continue
         cells = line.rstrip("\r\n").split(separator)
