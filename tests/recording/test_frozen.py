@@ -207,6 +207,17 @@ def test_an_inertial_sensor_that_stops_is_named(name: str, value: float) -> None
     assert frozen_warnings(log(**{name: sound})) == []
 
 
+@pytest.mark.parametrize("step", [0.0, 0.001])
+def test_a_gyroscope_with_a_dead_band_measures_straight_on(step: float) -> None:
+    """'Not measured, it seems. Leave these cells empty' was said of a controller that sends 0 below .03 rad/s."""
+    draws = np.random.default_rng(3)
+    way = np.where(TIME % 120 < 60, 0.4, -0.4)
+    turn = np.where(TIME % 60 > 50, way * np.sin((TIME % 60 - 50) / 10 * np.pi), 0.0)
+    sent = turn + 0.008 * draws.standard_normal(len(TIME))
+    sent = np.round(sent / step) * step if step else sent
+    assert frozen_warnings(log(angular_velocity_z=np.where(np.abs(sent) < 0.03, 0.0, sent))) == []
+
+
 def test_a_pitch_in_coarse_steps_keeps_its_value_on_level_ground() -> None:
     """Half a degree each, at 10 Hz."""
     coarse = np.round(0.02 * np.sin(TIME / 60) / 0.0087) * 0.0087

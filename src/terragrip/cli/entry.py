@@ -111,7 +111,7 @@ def _search_little_garbage() -> None:
 
 @cache
 def program(only: str | None = None) -> Any:
-    """The commands, or ``only`` one, as a group of click, made once: all take a tenth of a short command's time."""
+    """The commands, or ``only`` one, as a group of click, made once: all are a tenth of a short command's time."""
     app = typer.Typer(
         name="terragrip",
         help="Traction under the wheels, estimated from signals that a machine already has.",

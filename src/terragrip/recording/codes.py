@@ -44,7 +44,7 @@ _SLOWEST = 0.15  # s between samples: within more a machine may stop and go
 def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Recording, list[str]]:
     """The recording with such values missing, and a sentence on each code."""
     channels: dict[str, Floats] = {}
-    found: dict[str, list[tuple[str, str]]] = {}
+    by_code: dict[str, list[tuple[str, str]]] = {}
     for name, values in recording.channels.items():
         limit = _limit(name, vehicle)
         if limit is None:
@@ -63,13 +63,13 @@ def without_codes(recording: Recording, vehicle: Vehicle | None) -> tuple[Record
             if beyond
             else f"(the first at {moment(recording.time[np.argmax(bad)])} s), and leaps there and back"
         )
-        found.setdefault(shown, []).append((name, f"is {shown} in {bad.sum()} rows {seen}"))
-    notes = [_sentence(shown, each) for shown, each in found.items()]
+        by_code.setdefault(shown, []).append((name, f"is {shown} in {bad.sum()} rows {seen}"))
+    notes = [_sentence(shown, each) for shown, each in by_code.items()]
     return (replace(recording, channels={**recording.channels, **channels}) if channels else recording), notes
 
 
 def _sentence(shown: str, each: list[tuple[str, str]]) -> str:
-    """On the channels that have one code, each with what it looks like there."""
+    """On the channels that have one code, each with the sentence's part on it."""
     names = [name for name, _ in each]
     text = f"{names[0]} {each[0][1]}"
     if len(each) > 1:

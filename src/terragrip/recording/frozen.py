@@ -151,7 +151,8 @@ def _repeats(
     name: str, time: Floats, values: Floats, others: list[Floats], *, forces: bool = False
 ) -> list[str]:
     """A sentence on the longest run of one value while others change much. Speeds may stay at 0; ``forces`` that are 0 may be
-    switched off, and at their limits be as great as they can; an accelerometer, a gyroscope or a pitch keeps no value."""
+    switched off, and at their limits be as great as they can; an accelerometer, a gyroscope or a pitch keeps no value, but 0 within
+    a dead band: it is beyond on either side, and has no small values."""
     when, what = known_part(time, values)
     if not others or not may_last(when, what) or is_one_value(what):
         return []
@@ -167,7 +168,10 @@ def _repeats(
             f"{name} comes in steps of {step:.3g}, where {size:.3g} is fast: it and slip may be off by half a step while it keeps "
             "one value. Log it in finer steps; of counted pulses, take the mean in a profile ('window: 1 s')."
         ]
-    usable = (what[first] != 0.0) | (not forces and "speed" not in name)
+    at_zero = what[first] == 0.0
+    least = max(2 * step, _FINE * size)
+    dead_band = what.min() < 0.0 < what.max() and np.abs(what[what != 0.0]).min() > least
+    usable = ~at_zero | (not forces and "speed" not in name and not dead_band)
     if forces and name != "drawbar_force":  # a motor is held at its limit, a load cell never
         usable &= (what[first] > what.min()) & (what[first] < what.max())
     long = (lasting >= max(LONG, _TIMES * usual)) & usable

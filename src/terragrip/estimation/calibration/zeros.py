@@ -347,7 +347,8 @@ def inclination_zeros(
 
 
 def _places(windows: Windows, stops: Sequence[slice]) -> int:
-    """In how many places, `_HILL` apart along the way, the stops of one log surely are: the next log may begin where this one did."""
+    """In how many places, `_HILL` apart along the way, the stops of one log are: the next log may begin where this one did. A way that
+    comes back counts as another place: nothing here shows the course."""
     most = 0
     for log in {int(windows.recording[s.start]) for s in stops}:
         count, last = 0, -np.inf
