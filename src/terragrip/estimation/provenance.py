@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from terragrip.estimation.estimator import TractionEstimator
     from terragrip.recording import Recording
 
-_PUSHED = 0.05  # of the rows without an event: twice what 95 % intervals may miss on one side
+_PUSHED = (
+    0.05  # of the rows without another event than a push: twice what 95 % intervals may miss on one side
+)
 _FEWEST = 20  # rows
 
 
@@ -131,10 +133,10 @@ def with_push_note(parts: Iterator[Estimates]) -> Iterator[Estimates]:
         last = part
         if "soil_resistance" in part:
             free = part["soil_resistance"] + NORMAL_95 * part["soil_resistance_std"]
-            free = free[(part.event_codes == 0) & np.isfinite(free)]
+            free = free[((part.event_codes == 0) | part.during("push")) & np.isfinite(free)]
             below, rows = below + int(np.sum(free < 0)), rows + len(free)
     if last is not None:
-        share = f"{below / max(rows, 1):.0%} of the rows without an event"
+        share = f"{below / max(rows, 1):.0%} of the rows without another event than a push"
         note = (
             f"soil_resistance and its interval are below 0 in {share}, but no ground pushes a vehicle: check the torques (sign, scale, "
             "zero, what a driver subtracts for friction), drawbar_force and mass; a slope downhill, or another machine that pushes, does "
