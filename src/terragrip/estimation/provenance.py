@@ -139,7 +139,7 @@ def with_push_note(parts: Iterator[Estimates]) -> Iterator[Estimates]:
         share = f"{below / max(rows, 1):.0%} of the rows without another event than a push"
         note = (
             f"soil_resistance and its interval are below 0 in {share}, but no ground pushes a vehicle: check the torques (sign, scale, "
-            "zero, what a driver subtracts for friction), drawbar_force and mass; a slope downhill, or another machine that pushes, does "
-            "this, too, where nothing measures it."
+            "zero, what a driver subtracts for friction), drawbar_force, mass and tire_rolling_resistance; a slope downhill, or another "
+            "machine that pushes, does this, too, where nothing measures it."
         )
         yield replace(last, notes=(*last.notes, note)) if below >= max(_FEWEST, _PUSHED * rows) else last

@@ -42,7 +42,8 @@ def missing_channels(
         notes += _without_order(columns)
     if "ground_speed" not in proposals:
         notes.append("No ground speed is recognised: slip and resistance need it; positions will do.")
-    if wheels and vehicle is not None:
+    # By the engine's torque, or slip alone, `estimate` needs no speed of each wheel.
+    if wheels and vehicle is not None and any(name.startswith("drive_torque_") for name in proposals):
         notes += [
             f"No wheel speed is recognised for wheel {wheel} of the vehicle file, which is driven: name its column in a profile."
             for wheel, driven in zip(vehicle.wheels, vehicle.driven, strict=True)
