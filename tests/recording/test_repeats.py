@@ -120,6 +120,18 @@ def test_a_clock_that_was_set_back_is_no_message_that_comes_late(steps: float) -
         PLAIN.apply(frame)
 
 
+def test_a_receiver_whose_rows_all_come_late_is_no_clock_that_was_set_back() -> None:
+    """Stamped between two rows of the others, written behind the second."""
+    fast = log()
+    slow = log().iloc[25::50].assign(t=lambda rows: rows["t"] + 0.007)
+    right = pd.concat([fast, slow]).sort_values("t", ignore_index=True)
+    late = pd.concat([fast, slow.assign(key=slow["t"] + 0.02)])
+    late = late.assign(key=late["key"].fillna(late["t"])).sort_values("key", ignore_index=True)
+    assert (np.diff(late["t"]) < 0).sum() == len(slow)
+    found = PLAIN.apply(late.drop(columns="key"))
+    pandas.testing.assert_frame_equal(found.to_pandas(), PLAIN.apply(right).to_pandas())
+
+
 def test_labels_that_differ_in_blanks_alone_are_one() -> None:
     columns = {"t": np.array([0.0, 0.0, 1.0]), "field": np.array(["a", " a ", "b"], dtype=object)}
     kept, repeats = merged(columns, "t")
