@@ -99,40 +99,18 @@ def estimated(
     """
     options = options or RunOptions()
     require_vehicle(vehicle)
-    yield from with_push_note(_estimated(log, vehicle, options, beside, planned, progress, together))
-
-
-def _estimated(
-    log: LogBlocks,
-    vehicle: Vehicle,
-    options: RunOptions,
-    beside: str | os.PathLike[str] | None,
-    planned: Callable[[int, tuple[str, ...]], None] | None,
-    progress: Progress | None,
-    together: int,
-) -> Iterator[Estimates]:
-    """`estimated`, of a log of any kind."""
+    driven = None
     if vehicle.driveline is not None and by_engine((whole := log.whole()).channels, vehicle):
         driven = ByEngine(whole, vehicle)
-        yield from driven.completed(
-            _estimated(
-                driven.log(log),
-                driven.machine.vehicle,
-                options,
-                beside,
-                planned,
-                progress,
-                driven.machine.together,
-            )
-        )
-        return
+        log, vehicle, together = driven.log(log), driven.machine.vehicle, driven.machine.together
     cycles = ByCycle.of(log)
     if cycles is None:
-        yield from _row_by_row(log, vehicle, options, beside, planned, progress, together)
-        return
-    every = planned and (lambda _, names: planned(log.rows, names))
-    parts = _row_by_row(cycles.log(log), vehicle, options, beside, every, progress, together)
-    yield from cycles.spread(log, parts)
+        parts = _row_by_row(log, vehicle, options, beside, planned, progress, together)
+    else:
+        every = planned and (lambda _, names: planned(log.rows, names))
+        parts = _row_by_row(cycles.log(log), vehicle, options, beside, every, progress, together)
+        parts = cycles.spread(log, parts)
+    yield from with_push_note(parts if driven is None else driven.completed(parts))
 
 
 def _row_by_row(
