@@ -116,11 +116,14 @@ def _whole_instants(blocks: Iterator[Columns], column: str) -> Iterator[Columns]
     held: Columns = {}
     for block in blocks:
         before, stamps = held.get(column, block[column][:0]), block[column]
-        if len(before) and len(stamps) and (first := stamps[: LATE + 1].min()) <= before[-1]:
-            other = np.flatnonzero(before < first)
-            cut = int(other[-1]) + 1 if len(other) else 0
-            block = {name: np.concatenate([held[name][cut:], values]) for name, values in block.items()}
-            held = {name: values[:cut] for name, values in held.items()}
+        if len(before) and len(stamps):
+            first = stamps[: LATE + 1].min()
+            new_day = len(before) > LATE and first < before[-1 - LATE :].min()  # of a clock of one day
+            if first <= before[-1] and not new_day:
+                other = np.flatnonzero(before < first)
+                cut = int(other[-1]) + 1 if len(other) else 0
+                block = {name: np.concatenate([held[name][cut:], values]) for name, values in block.items()}
+                held = {name: values[:cut] for name, values in held.items()}
         if held:
             yield held
         held = block
