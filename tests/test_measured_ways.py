@@ -116,8 +116,8 @@ def test_nobody_is_stuck_on_the_grass(shared: Located, name: str) -> None:
 
 def test_innovations_on_grass_are_of_the_right_order(shared: Located) -> None:
     """Warthog, bank. The accelerometer's NIS is near 1. The derived ground speed's was 2.2 to 4.1 while its noise lacked what
-    uncertain stamps and the window do to it. One log's accelerometer has .52 (.59 before 0171; the others .81 to 1.09), another's
-    ground speed .71 (1.32 before 0174, by which its pitch, of a tilted map, may be wrong)."""
+    uncertain stamps and the window do to it. One log's accelerometer has .52 (.59 before wheels moved by their own samples; the
+    others .81 to 1.09), another's ground speed .71 (1.32 before 0174, by which its pitch, of a tilted map, may be wrong)."""
     logs = sorted(shared("data/drive_warthog/raw20hz").glob("*.csv.gz"))
     assert len(logs) == 5
     vehicle = tg.Vehicle.load(EXAMPLES / "drive_warthog/vehicle.yaml")

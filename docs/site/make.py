@@ -80,6 +80,7 @@ CONTENTS: dict[str, list[str]] = {
         "architecture-history",
         "kernel",
         "tuned-numbers",
+        "ablation",
         "mutants",
         "decisions/README",
     ],

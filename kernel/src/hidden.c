@@ -30,7 +30,7 @@ static tg_real product(const tgi_constants *c, const tg_real *a, const tg_real *
 
 /* Add the products of two stretches, `away` wheel radii between their middles: to the relative variance of adhesion by load, and to that of
  * the adhesions. The first counts as far as it is beyond chance, given loads as the adhesions show them, or greater ones as far as it is
- * itself beyond two SDs of chance; as far as it is chance, slips are taken to hide as much as the adhesions show (docs/decisions/0173). */
+ * itself beyond two SDs of chance; as far as it is chance, slips are taken to hide as much as the adhesions show (docs/decisions/0115). */
 static void add_product(tg_estimator *e, const tgi_stretch *now, const tgi_stretch *before, tg_real away)
 {
     tgi_hidden *h = &e->hidden;

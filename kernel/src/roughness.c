@@ -1,7 +1,7 @@
 /* Uneven ground, as the estimates themselves show it (R). Nothing on board measures how a wheel's load varies over the ground's
  * bumps: the force follows the load, and the estimate mistakes it for adhesion. Wheels at one slip share a curve, so the difference of one
  * wheel's adhesion from the others' within a few wheel radii counts as unseen load, a variance relative to the adhesion. A wheel that no
- * motor drives is at no such slip, though its torque be measured: it does not count (docs/decisions/0173). Where only one wheel is driven, its difference from its own mean. rho_s varies likewise: a wheel that climbs a bump is held back by load times gradient,
+ * motor drives is at no such slip, though its torque be measured: it does not count (docs/decisions/0115). Where only one wheel is driven, its difference from its own mean. rho_s varies likewise: a wheel that climbs a bump is held back by load times gradient,
  * which no pitch sensor reads, while soil itself changes more slowly. Lengths are in wheel radii, so they scale with the machine. */
 #include "estimator.h"
 
@@ -106,7 +106,7 @@ tg_real tgi_unseen_bumps(const tg_estimator *e)
 /* A mean square of adhesions over that of the wheels' own. */
 tg_real tgi_relative(const tg_estimator *e, tg_real square) { return square / (e->roughness.square + TG_SMALL_ADHESION); }
 
-/* Mean square by which the wheels' adhesions differ, less the estimates' own noise (docs/decisions/0159). */
+/* Mean square by which the wheels' adhesions differ, less the estimates' own noise (docs/decisions/0115). */
 tg_real tgi_scatter(const tg_estimator *e) { return tgi_max(e->roughness.scatter - TG_NOISE_SHARE * e->roughness.own, 0); }
 
 /* Relative variance of a wheel's load that the loads of the model do not contain: the scatter, with what slips

@@ -1,7 +1,7 @@
 /* Slope as the motion shows it, where there is an accelerometer: it reads dv/dt + g sin(slope), so what it reads beyond the change of
  * ground speed is slope. A pitch sensor alone errs by its mounting and by wheels that sink unevenly; without one the whole slope is
  * found, and where ground speeds disagree with the forces a sensed one may be as wrong: a pose in a map that is not level errs by the course
- * (docs/decisions/0174-pitch-that-is-not-of-the-level.md). A Kalman filter of two states, ground speed and slope error, beside the main one
+ * (docs/decisions/0174-while-the-ground-speed-is-silent.md). A Kalman filter of two states, ground speed and slope error, beside the main one
  * (R). The effect of a whole slope's error on the speed over a step is process noise of the main filter, which then weights ground speeds as
  * this one does. The accelerometer's bias is part of the slope error too, as it should be: the two then agree on dv/dt. */
 #include "estimator.h"

@@ -1,4 +1,4 @@
-/* Each wheel's own time (docs/decisions/0171-each-wheel-moves-by-its-own-samples.md). A wheel's slip settles within milliseconds, so that its
+/* Each wheel's own time (docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so that its
  * speed changes as slowly as the vehicle's, while a torque's noise, or an old torque, integrated between two samples of the speed would make
  * it run away. So the model moves a wheel from sample to sample of its speed, by the torque of the later one; in rows between, it waits.
  * Where torques come faster than the speed, it moves with each of them, too, and its speed is steady: so the adhesion follows the torque. */

@@ -144,7 +144,7 @@ def test_adhesion_does_not_lag_a_torque_that_comes_with_every_row(method: str, m
 
 @pytest.mark.parametrize(("rate", "least"), [(20.0, 0.98), (10.0, 0.97), (5.0, 0.95)])
 def test_adhesion_of_a_row_is_that_of_its_torque(rate: float, least: float) -> None:
-    """The mean of two rows' torques is half a row old: R² was .965, .92 and .73 (docs/decisions/0166)."""
+    """The mean of two rows' torques is half a row old: R² was .965, .92 and .73 (docs/decisions/0096)."""
     d = robot(rate)
     estimates = estimate(d.recording, d.vehicle)
     rows = slice(int(3 * rate), None)

@@ -75,7 +75,7 @@ def settings_in(
 
 
 def rounded_noise(recording: Recording, vehicle: Vehicle) -> dict[str, float]:
-    """By channel the SD that the vehicle file gives, with what the log's rounding adds to it (docs/decisions/0159), or that of a derived
+    """By channel the SD that the vehicle file gives, with what the log's rounding adds to it (docs/decisions/0115), or that of a derived
     channel where it is more; without the rest."""
     from terragrip.recording import rounding_noise
 
