@@ -130,3 +130,30 @@ def test_ctrl_c_leaves_whole_files(tmp_path: Path) -> None:
     for path in written:
         if path.suffix == ".parquet":
             assert len(pd.read_parquet(path)) > 0
+
+
+@POSIX
+def test_ctrl_c_in_a_destructor_is_not_lost() -> None:
+    """Python ignores what is raised there: once a campaign of runs went on to its end and gave 0."""
+    destroyed = """
+import signal, sys, time
+import terragrip.simulation
+from terragrip.cli import main
+
+class Kept:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+def names():
+    Kept()
+    time.sleep(60)
+    return ["never"]
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+terragrip.simulation.set_names = names
+sys.exit(main())
+"""
+    command = [sys.executable, "-c", destroyed, "simulate", "--list"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert (run.returncode, run.stdout) == (130, "")
+    assert len(run.stderr.strip().splitlines()) == 1

@@ -6,7 +6,9 @@ import atexit
 import contextlib
 import gc
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from functools import cache
@@ -81,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         _search_little_garbage()
+        if os.name == "posix":
+            sys.unraisablehook = _interrupt_again
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
     if not (debug or "--verbose" in words):
@@ -107,6 +111,17 @@ def _search_little_garbage() -> None:
     of a short command's time."""
     gc.set_threshold(20_000)
     atexit.register(gc.freeze)
+
+
+def _interrupt_again(ignored: sys.UnraisableHookArgs) -> None:
+    """Python ignores what is raised in a destructor or a weak reference's callback, a Ctrl-C too: one of some 300, measured
+    while runs were saved. It is sent again, by a timer: here it would be ignored once more."""
+    if issubclass(ignored.exc_type, KeyboardInterrupt):
+        again = threading.Timer(0.05, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(ignored)
 
 
 @cache
