@@ -115,7 +115,7 @@ def test_the_covariance_is_that_of_leaving_out_each_block_and_of_the_priors() ->
             name: getattr(data, name)[kept]
             for name in ("torque", "known", "leverage", "slip", "soil", "block")
         }
-        curves = replace(problem.curves, steepness=problem.steepness[kept])
+        curves = replace(problem.curves, by_form=problem.curves.by_form[:, kept])
         rest = replace(problem, data=replace(data, **parts), curves=curves, local=problem.local[kept])
         values.append(rest.solve(best, 1.0))
     apart = np.array(values) - np.mean(values, axis=0)

@@ -35,7 +35,7 @@ def test_neither_noise_nor_a_wrong_radius_flattens_the_curve(
 ) -> None:
     for seed in range(5):
         found, true = curves(noise, shift, known, seed)
-        assert abs(np.mean(found.steepness) / np.mean(true) - 1) < within
+        assert abs(np.mean(found.of(None)) / np.mean(true) - 1) < within
 
 
 def test_a_radius_that_nobody_knows_leaves_the_steepness_open() -> None:
@@ -53,7 +53,7 @@ def test_a_late_ground_speed_does_not_bend_the_curve() -> None:
         measured = slip + 0.1 * rate + 0.01 * rng.standard_normal(N)
         true = np.mean(TOP * RATE * np.exp(-RATE * slip))
         taken, ignored = (
-            np.mean(steepness_of(level, measured, SOIL, 0.005, np.arange(N) // 4, by).steepness) / true
+            np.mean(steepness_of(level, measured, SOIL, 0.005, np.arange(N) // 4, by).of(None)) / true
             for by in (rate, np.zeros(N))
         )
         assert abs(taken - 1) < 0.35

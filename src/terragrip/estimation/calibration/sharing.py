@@ -89,11 +89,15 @@ def fit_shared_gains(data: Sharing) -> SharedGains | None:
     """Estimate the relative gains; None where there are too few windows."""
     if len(data.torque) < _LEAST_WINDOWS:
         return None
-    best = _solved(data)
+    first = _Problem.of(data)
+    start = first.solve(np.zeros(len(first.prior)), 1.0)
+    best = _solved(first.refined(start), start)
     error = min(best.problem.curves.relative_std, _MOST_STRETCH)
-    others = [(0.5, _solved(data, best.values, stretch=1 + sign * error)) for sign in (-1.0, 1.0)]
+    # Where curves are steeper by a factor than they look, or of another form than fits best.
+    around = first.refined(best.values)
+    others = [(0.5, _solved(replace(around, stretch=1 + sign * error), best.values)) for sign in (-1.0, 1.0)]
     others += [
-        (chance, _solved(data, best.values, form=form))
+        (chance, _solved(replace(around, form=form), best.values))
         for form, chance in enumerate(best.problem.curves.chance)
         if chance > _UNLIKELY
     ]
@@ -123,18 +127,15 @@ class _Solution(NamedTuple):
     scale: float  # the design effect that the priors are weighted with
 
 
-def _solved(
-    data: Sharing, start: Floats | None = None, *, stretch: float = 1.0, form: int | None = None
-) -> _Solution:
-    """The unknowns where curves are steeper by a factor than they look, or of another form than fits best; sooner from a start nearby."""
-    w = data.torque.shape[1]
-    problem = replace(_Problem.of(data), stretch=stretch, form=form)
-    if start is None:
-        start = problem.solve(np.zeros(len(problem.prior)), 1.0)
-    problem = problem.refined(start)
+def _solved(problem: _Problem, start: Floats) -> _Solution:
+    """The unknowns, from a start nearby."""
+    w = problem.data.torque.shape[1]
     values = problem.solve(start, 1.0)
     fit = problem.fit(values, 1.0)
-    naive, clustered = _inverse(fit.normal) * fit.variance, problem.covariance(values, 1.0, data.block)
+    naive, clustered = (
+        _inverse(fit.normal) * fit.variance,
+        problem.covariance(values, 1.0, problem.data.block),
+    )
     # Neighbouring windows repeat each other: weigh the priors against the data's true information.
     scale = max(1.0, float(np.trace(clustered[:w, :w]) / np.trace(naive[:w, :w])))
     return _Solution(problem, problem.solve(values, scale), scale)
@@ -164,7 +165,7 @@ class _Problem:
     @property
     def steepness(self) -> Floats:
         """(n,) d_n."""
-        return self.curves.steepness
+        return self.stretch * self.curves.of(self.form)
 
     @classmethod
     def of(cls, data: Sharing) -> _Problem:
@@ -176,7 +177,7 @@ class _Problem:
         if turns:
             prior[-1, -1] = data.yaw_std**-2.0
         noise = 0.02 * float(np.median(np.abs(data.torque)))
-        flat = Steepness(np.zeros(n), 0.0, np.ones(1))
+        flat = Steepness(np.zeros((1, n)), 0.0, np.ones(1))
         problem = cls(data, prior, max(noise, 1e-9), flat, np.full(n, _LOCAL))
         return problem._with_steepness(np.zeros(len(prior)))
 
@@ -197,10 +198,8 @@ class _Problem:
         level, _, _ = self._levels(values)
         data = self.data
         by_delay = np.zeros(len(level)) if data.by_delay is None else data.by_delay
-        curves = steepness_of(
-            level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, by_delay, self.form
-        )
-        return replace(self, curves=replace(curves, steepness=self.stretch * curves.steepness))
+        curves = steepness_of(level, data.slip.mean(axis=1), data.soil, data.slip_std, data.block, by_delay)
+        return replace(self, curves=curves)
 
     def _levels(self, values: Floats) -> tuple[Floats, Floats, Floats]:
         """m_n (n,), the residual torque (n, w) and its spread (n, w) at the unknowns' values."""

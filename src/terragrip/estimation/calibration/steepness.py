@@ -30,27 +30,25 @@ _HUBER = 2.0
 
 @dataclass(frozen=True)
 class Steepness:
-    """``steepness`` (n,) dm/ds at each window; ``relative_std``: of an error that all share; ``chance``: how likely each form is."""
+    """``by_form`` (m, n) dm/ds at each window; ``chance`` (m,): how likely each form is; ``relative_std``: of an error that all windows
+    share, where the likeliest form is the right one."""
 
-    steepness: Floats
+    by_form: Floats
     relative_std: float
     chance: Floats
 
+    def of(self, form: int | None) -> Floats:
+        """dm/ds (n,) of a form; None: of the likeliest."""
+        return np.asarray(self.by_form[np.argmax(self.chance) if form is None else form])
+
 
 def steepness_of(
-    level: Floats,
-    slip: Floats,
-    soil: Ints,
-    slip_std: float,
-    block: Ints,
-    by_delay: Floats,
-    form: int | None = None,
+    level: Floats, slip: Floats, soil: Ints, slip_std: float, block: Ints, by_delay: Floats
 ) -> Steepness:
     """The curves' steepness at levels (n,) of slips (n,); ``soil`` and ``block`` (n,) labels from 0.
 
     ``slip_std``: of an error that all slips share; ``by_delay`` (n,) 1/s: what a second's delay adds to each. Neighbouring windows repeat
     each other, so a stretch of track counts as one.
-    ``form``: the place in `_ROOM` of the one to take; None: the one that fits best.
     """
     size, signed = np.abs(level), np.where(level < 0, -slip, slip)
     soils = int(soil.max()) + 1
@@ -65,9 +63,8 @@ def steepness_of(
     )
     fits = len(np.unique(block)) * np.log(np.maximum(losses, 1e-9))
     chance = np.exp(np.min(fits) - fits)
-    taken = int(np.argmax(chance)) if form is None else form
-    steepness = (1 - share[taken]) / inverse[taken, soil]
-    return Steepness(steepness, float(deviation[taken]), chance / chance.sum())
+    deviation_of_best = float(deviation[np.argmax(chance)])
+    return Steepness((1 - share) / inverse[:, soil], deviation_of_best, chance / chance.sum())
 
 
 def _regressed(
@@ -81,13 +78,14 @@ def _regressed(
     squared = (common[:, :, None] * common[:, None, :]).reshape(len(soil), -1)
     precision = np.diag(np.maximum(common_std, 1e-6) ** -2.0)
     inverse, by_all = np.full((len(form), soils), _PRIOR[0]), np.zeros((len(form), common.shape[1]))
+    cell = (soils * np.arange(len(form))[:, None] + soil).ravel()
 
     def residual(inverse: Floats) -> Floats:
         return np.abs(slip - form * inverse[:, soil] - by_all @ common.T)
 
     def by_soil(values: Floats) -> Floats:
         """Sums of values (m, n) over each soil: (m, soils)."""
-        return np.array([np.bincount(soil, row, soils) for row in values])
+        return np.bincount(cell, values.ravel(), inverse.size).reshape(inverse.shape)
 
     # A soil's term stands in its rows alone, so the normal equations are diagonal but for the terms that all share, which are solved first.
     for _ in range(_ROUNDS):

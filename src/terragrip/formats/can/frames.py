@@ -77,15 +77,17 @@ class Frames:
             self.count += len(time)
             self.first = float(time[0]) if self.first is None and len(time) else self.first
         parts: Bools = np.zeros(len(time), dtype=bool)
-        for identifier in np.unique(identifiers).tolist():
-            route, rows = self._route_of(identifier, whole=whole), identifiers == identifier
+        order = np.argsort(identifiers, kind="stable")
+        each, begins = np.unique(identifiers[order], return_index=True)
+        for identifier, rows in zip(each.tolist(), np.split(order, begins)[1:], strict=True):
+            route = self._route_of(identifier, whole=whole)
             if isinstance(route, list):
                 held = lengths[rows].astype(np.uint16)
                 route.append((time[rows], held, data[rows, : held.max()]))
             elif route is not None:
-                parts |= rows  # whose order counts
+                parts[rows] = True  # whose order counts
             elif (bare := without_bus(identifier)) in self.unknown:
-                self.unknown[bare] += int(rows.sum())
+                self.unknown[bare] += len(rows)
         put_together: list[Frame] = []
         for k in np.flatnonzero(parts).tolist():
             message = self.transport.add(int(identifiers[k]), data[k, : lengths[k]].tobytes())
