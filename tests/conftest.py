@@ -56,6 +56,14 @@ undrawn_in_file = pytest.fixture(_undrawn, name="undrawn_in_file", scope="module
 
 
 @pytest.fixture(scope="module")
+def unchecked() -> Generator[None]:
+    """No log is searched for what is likely wrong in it: for tests of the estimates alone, which take half of the time then."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("terragrip.estimation.batch.notes_of", lambda _, recording: tuple(recording.notes))
+        yield
+
+
+@pytest.fixture(scope="module")
 def small_forests() -> Generator[None]:
     """Ground classifiers grow a fifth of their trees, which takes half of the time of learning from a few drives; scikit-learn's whole
     forest is compared in test_classifier_parts.py, and the measured grounds of test_classifier_husky.py are told with it."""

@@ -15,6 +15,8 @@ from terragrip.vehicle_maker import SIGNALS, class_named, classes, fields, inter
 from terragrip.vehicle_maker.drive import drive
 from terragrip.vehicle_maker.maker import vehicle_of
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 
 @pytest.mark.parametrize("signals", SIGNALS)
 @pytest.mark.parametrize("name", [one.name for one in classes()])

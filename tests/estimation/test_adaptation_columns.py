@@ -8,6 +8,8 @@ import pytest
 from drives import WHEELS, drive, robot
 from terragrip.estimation import METHODS, Estimates, TractionEstimator, estimate
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 STATES = (
     *(f"wheel_speed_{w}" for w in WHEELS), "ground_speed",
     *(f"adhesion_{w}" for w in WHEELS), "soil_resistance",

@@ -8,6 +8,8 @@ import pytest
 import terragrip as tg
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 LENGTH, TRACK, RADIUS, MASS, SLIP, MU = 2.7, 1.8, 0.8, 6000.0, 0.03, 0.12
 SIDES = {"fl": 0.5, "fr": -0.5, "rl": 0.5, "rr": -0.5}
 

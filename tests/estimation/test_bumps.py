@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from tests.estimation.drives import RADIUS, Drive, drive, robot
 
 from terragrip.estimation import Estimates, estimate
+
+pytestmark = pytest.mark.usefixtures("unchecked")
 
 SPEED, SECONDS = 0.6, 60.0
 

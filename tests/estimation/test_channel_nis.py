@@ -10,6 +10,8 @@ from drives import WHEELS, drive, robot
 from terragrip.estimation import estimate
 from terragrip.estimation.channel_nis import PREFIX, estimate_with_channel_nis
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 SPEEDS = (*(f"wheel_speed_{wheel}" for wheel in WHEELS), "ground_speed")
 
 

@@ -11,6 +11,8 @@ from tests.estimation.drives import INERTIA, RADIUS, WHEELS, Drive, drive, robot
 
 from terragrip.estimation import estimate
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 RATE = 50.0
 
 

@@ -8,6 +8,8 @@ import pytest
 import terragrip as tg
 from terragrip.physics.adhesion import CURVES
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 WHEELS = ("fl", "fr", "rl", "rr")
 COLUMNS = [f"curve_a{end}{std}" for end in ("", *(f"_{w}" for w in WHEELS)) for std in ("", "_std")]
 

@@ -18,6 +18,8 @@ from terragrip.recording import LogBlocks
 from terragrip.recording.cycles import cycles_in
 from terragrip.recording.survey import joined
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 STEP = 0.001
 DURATION = 12.0
 

@@ -10,6 +10,8 @@ from terragrip.estimation import estimate
 from terragrip.estimation.calibration.windows import windows
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 FRICTION = 4.0  # N m: .06 of adhesion
 
 

@@ -15,6 +15,8 @@ from terragrip.estimation.engine_torque import TAIL
 from terragrip.estimation.estimator import TractionEstimator
 from terragrip.estimation.sealed import seal, unseal
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 NOISE = {
     "ground_speed": 0.02,
     "drawbar_force": 50.0,

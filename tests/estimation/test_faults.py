@@ -14,6 +14,8 @@ from terragrip.errors import InputError
 from terragrip.estimation import METHODS, TractionEstimator, estimate
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 FILTERS = tuple(name for name in METHODS if name != "algebraic")
 
 

@@ -14,6 +14,8 @@ from terragrip.estimation import Estimates, estimate
 from terragrip.ground.events import events
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 LOST, BACK = 60.0, 130.0  # s
 
 

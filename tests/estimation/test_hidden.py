@@ -12,6 +12,8 @@ from terragrip.estimation import estimate
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 RADIUS, MASS, SPEED, RESISTANCE, PULL, SLIP, RATE = 0.2, 100.0, 0.6, 0.05, 0.25, 0.05, 50.0
 SIDES = {"l": 1.0, "r": -1.0}
 NOISE = {"wheel_speed": 0.05, "ground_speed": 0.02, "drive_torque": 0.3, "drawbar_force": 2.0}

@@ -14,6 +14,8 @@ from terragrip.simulation import SimulationResult, simulate
 from terragrip.simulation.families import Kind, scenario
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 MACHINES = (
     (Kind("tractor", "brixius", "multirate"), 0),
     (Kind("tractor", "sinkage", "even"), 10),

@@ -14,6 +14,8 @@ from terragrip.errors import InputError
 from terragrip.estimation import TractionEstimator, estimate
 from terragrip.physics.loads import GRAVITY, axle_loads
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 OVERHANG = 0.25
 
 

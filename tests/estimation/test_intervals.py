@@ -18,6 +18,8 @@ from terragrip.simulation import SimulationResult, simulate
 from terragrip.simulation.families import draw, machines
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 SEEDS = (1002, 1010)
 WHEELS = ("fl", "fr", "rl", "rr")
 QUANTITIES = tuple([f"{kind}_{w}" for kind in ("adhesion", "slip") for w in WHEELS] + ["soil_resistance"])

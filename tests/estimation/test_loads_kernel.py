@@ -10,6 +10,8 @@ from terragrip.estimation import Estimates, estimate
 from terragrip.physics.loads import GRAVITY, axle_loads, lateral_shares
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 
 def steady(seconds: float = 12.0, **channels: float) -> Recording:
     """Constant signals, no noise."""

@@ -12,6 +12,8 @@ from terragrip.physics.loads import GRAVITY, axle_loads
 from terragrip.physics.slip import slip as slip_of
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 TRACK, RESISTANCE, SLIP = 0.554, 0.06, 0.05  # m; the slip in the mean
 
 

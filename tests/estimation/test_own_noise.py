@@ -12,6 +12,8 @@ from tests.estimation.drives import WHEELS, Drive, drive, robot
 from terragrip.estimation import TractionEstimator, estimate
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 STATED = {"wheel_speed": 0.09, "ground_speed": 0.06, "drive_torque": 3.0, "drawbar_force": 12.0}
 
 

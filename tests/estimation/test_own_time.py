@@ -12,6 +12,8 @@ import terragrip as tg
 from drives import drive, robot
 from terragrip.simulation import SimulationResult, families
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 MACHINE = families.Kind("tractor", "brixius", "coarse")
 """A torque rounded to a quarter of the adhesion: only many samples together tell it."""
 

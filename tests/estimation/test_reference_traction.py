@@ -12,6 +12,8 @@ from kernel_twin import Considered, Constant, Input, Machine, Step, TractionFilt
 from kernel_twin.filters import jacobian
 from kernel_twin.smoother import smooth
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 Array = NDArray[Any]
 
 

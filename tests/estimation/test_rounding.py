@@ -15,6 +15,8 @@ from terragrip.errors import InputError
 from terragrip.estimation import METHODS, Estimates, TractionEstimator, engine, estimate, settings
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 
 @pytest.fixture
 def single(monkeypatch: pytest.MonkeyPatch) -> Any:

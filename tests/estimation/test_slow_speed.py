@@ -7,12 +7,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
 from drives import robot
 from terragrip.estimation import Estimates, TractionEstimator, estimate
 from terragrip.simulation import SimulationResult
 from terragrip.simulation.families import Kind, draw, machines
+
+pytestmark = pytest.mark.usefixtures("unchecked")
 
 RATE, MEMORY = 50.0, 30.0  # 1/s, s
 

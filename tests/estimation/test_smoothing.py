@@ -12,6 +12,8 @@ from terragrip.estimation.methods import method_named
 from terragrip.estimation.smoothing import smoothed
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 SMOOTHABLE = ("kalman", "ukf", "aukf", "aukf-fs", "bank")
 QUANTITIES = ("adhesion_rr", "slip_fl", "soil_resistance", "ground_speed")
 

@@ -10,6 +10,8 @@ from kernel_twin.reckoning import Reckoning
 from kernel_twin.speeds import SpeedsFilter, process_noise, transition
 from terragrip.units import STANDARD_GRAVITY
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 RADIUS = 0.25
 
 

@@ -13,6 +13,8 @@ from terragrip.estimation import estimate
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 RIM, HUB, TRACK = 0.4, 0.32, 0.554  # m/s, m/s, m
 SIDES = np.array([1.0, -1.0])
 TIME = np.arange(0, 14.0, 0.02)

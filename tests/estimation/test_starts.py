@@ -13,6 +13,8 @@ from terragrip.estimation.engine import EVENTS
 from terragrip.recording import Recording
 from terragrip.simulation.families import Kind, draw
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 STANDSTILL = EVENTS.index("standstill")
 
 

@@ -12,6 +12,8 @@ from terragrip.physics.slip import hub_speed
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 WHEELS = ("fl", "fr", "rl", "rr")
 MASS, RADIUS, TRACK, LENGTH, G = 5000.0, 0.8, 1.8, 2.6, 9.80665
 SLIP = 0.05

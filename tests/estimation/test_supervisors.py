@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import terragrip as tg
 from drives import robot
+
+pytestmark = pytest.mark.usefixtures("unchecked")
 
 
 def test_under_a_speed_loop_a_change_of_soil_shows_in_torque_alone() -> None:

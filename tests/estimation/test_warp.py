@@ -12,6 +12,8 @@ from tests.estimation.drives import BEARING, MASS, RADIUS, TIRE, WHEELS, Drive, 
 from terragrip.estimation import Estimates, estimate
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 WEIGHT = MASS * 9.81 / 4
 AXLES = ("front", "front", "rear", "rear")
 LAYOUT = {"diagonal": (1, -1, -1, 1), "side": (1, -1, 1, -1), "axle": (1, 1, -1, -1)}

@@ -12,6 +12,8 @@ from terragrip.ground.live import LiveGround
 from terragrip.simulation import simulate
 from terragrip.simulation.campaign import run_seed
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 
 def run(name, seed):
     return simulate(name, run_seed(seed, name), machine_seed=seed)

@@ -32,7 +32,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How to estimate a log; the fields are arguments of :func:`estimate`."""
+    """How to estimate a log; fields are arguments of :func:`estimate`, but for ``checked``: whether its likely faults are noted."""
 
     method: str = DEFAULT
     smooth: bool = False
@@ -40,6 +40,7 @@ class RunOptions:
     held: Mapping[str, float] | None = None
     gap: float | None = None
     standstill_speed: float | None = None
+    checked: bool = True
 
     def __post_init__(self) -> None:
         method_named(self.method, smooth=self.smooth)
@@ -149,11 +150,11 @@ def _row_by_row(
         beside_them = (*carried_channels(known.sample, estimator), *known.sample.labels)
         planned(known.rows, ("time", *estimator.columns, *beside_them, "event"))
     checks = ThreadPoolExecutor(1)  # beside the kernel, which holds no lock: a sixth of a short log's time
-    found = checks.submit(notes_of, estimator, known.sample)
+    found = checks.submit(notes_of, estimator, known.sample) if options.checked else None
     checks.shutdown(wait=False)
 
     def notes() -> tuple[str, ...]:
-        return (*found.result(), *turn_notes)
+        return (*(found.result() if found else ()), *turn_notes)
 
     blocks = (known.without_empty(block) for block in log.blocks())
     forward = passes.of(log.from_disk)

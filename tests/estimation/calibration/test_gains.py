@@ -145,7 +145,7 @@ def test_torques_that_never_change_give_a_reason(
     drive: Make, vehicle: Vehicle, stuck: tuple[str, ...]
 ) -> None:
     """One gave NumPy's warning on standard error, all of them a ZeroDivisionError."""
-    log = drive()
+    log = drive(45)
     result = calibrate(
         log.with_channels(**{f"drive_torque_{w}": np.full(len(log), 3.0) for w in stuck}), vehicle
     )

@@ -85,7 +85,7 @@ def _regressed(
 
     def by_soil(values: Floats) -> Floats:
         """Sums of values (m, n) over each soil: (m, soils)."""
-        return np.bincount(cell, values.ravel(), inverse.size).reshape(inverse.shape)
+        return np.asarray(np.bincount(cell, values.ravel(), inverse.size), np.float64).reshape(inverse.shape)
 
     # A soil's term stands in its rows alone, so the normal equations are diagonal but for the terms that all share, which are solved first.
     for _ in range(_ROUNDS):
