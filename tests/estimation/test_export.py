@@ -375,3 +375,17 @@ def test_an_interrupt_while_parquet_is_written_is_no_full_disk(estimates, tmp_pa
     with pytest.raises(KeyboardInterrupt):
         estimates.write(tmp_path / "x.parquet")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_sheet_that_finds_no_room_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sheets' rows stayed beside it on a full disk, three files of `tmp...`."""
+    from terragrip.estimation.export.spreadsheet import Spreadsheet
+
+    def full(self: Spreadsheet) -> None:
+        raise OSError(28, "No space left on device")
+
+    estimates = estimate(log(), robot())
+    monkeypatch.setattr(Spreadsheet, "close", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        estimates.write(tmp_path / "e.xlsx")
+    assert list(tmp_path.iterdir()) == []

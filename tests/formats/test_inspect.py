@@ -400,6 +400,30 @@ def test_a_driven_wheel_without_a_speed_is_held_against_the_vehicle_file(
     assert not is_named()  # slip alone needs no more
 
 
+def test_wheels_of_other_names_than_the_vehicle_files_are_one_sentence(tmp_path: Path) -> None:
+    """Torques were asked for of wheels that the vehicle file does not have, and speeds of those that it has."""
+    frame = pd.DataFrame({"time": 0.1 * np.arange(50), "gps_speed": 1.0 + 0.1 * np.sin(np.arange(50))})
+    for wheel in ("rl", "rr", "fl", "fr"):
+        frame[f"wheel_speed_{wheel}"] = 3 * frame["gps_speed"]
+    for wheel in ("rl", "rr"):
+        frame[f"drive_torque_{wheel}"] = 10 + ramp(3)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    axles = {
+        "front": {"mass": 50, "wheels": ["1l", "1r"], "driven": False},
+        "rear": {"mass": 50, "wheels": ["2l", "2r"]},
+    }
+    shape = {
+        "wheelbase": 1.0,
+        "track": 0.5,
+        "center_of_gravity_height": 0.3,
+        "wheel": {"radius": 0.3, "inertia": 0.1},
+    }
+    (note,) = inspect(
+        tmp_path / "log.csv", vehicle=Vehicle.from_dict({"mass": 100, "axles": axles, **shape})
+    ).missing
+    assert note.startswith("The vehicle file has no wheel fl, fr, rl, rr; its wheels are 1l, 1r, 2l, 2r")
+
+
 def test_a_remark_of_numbers_that_ends_in_words_is_left_alone(tmp_path: Path) -> None:
     """A block of a long file takes it for numbers, the next for texts."""
     rows = [f"{0.01 * k:.2f},1.0{k % 7},5.0{k % 9},3" for k in range(100_000)]

@@ -283,6 +283,20 @@ def test_counts_of_an_encoder_become_a_wheel_speed() -> None:
         assert np.allclose(recording.channels["wheel_speed_rl"][near], expected, atol=0.05)
 
 
+@pytest.mark.parametrize("low", [0, -2048])
+def test_counts_that_overflow_go_on(low: int) -> None:
+    """12 bits of 1024 counts a turn, four turns: a fifth of the rows were off, to -59 rad/s for 9.5."""
+    time = np.arange(0, 60, 0.02)
+    turned = np.interp(time, [0, 30, 35, 60], [0, 285, 285, 100])
+    counts = (np.floor(turned * 1024 / (2 * np.pi)) - low) % 4096 + low
+    source = {"derivative_of": "ticks", "scale": 2 * np.pi / 1024, "unit": "rad", "window": "0.5 s"}
+    channels = {"ground_speed": "v", "wheel_speed_rl": source}
+    profile = Profile.from_dict({"time": {"from": "t"}, "channels": channels})
+    speed = profile.apply({"t": time, "v": np.full(len(time), 0.3), "ticks": counts})["wheel_speed_rl"]
+    for rows, expected in (((time > 1) & (time < 29), 9.5), ((time > 36) & (time < 59), -7.4)):
+        assert np.allclose(speed[rows], expected, atol=0.1)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_jumps_of_the_pose_gaps_and_held_poses(seed: int) -> None:
     frame, speed = drive(20, seed=seed, noise=0.002)
@@ -564,6 +578,26 @@ def test_efforts_that_are_nothing_but_0_are_no_torques(foreign: pd.DataFrame, em
     log["/joint_states.effort.front_left"] = np.where(np.arange(len(log)) == 1, 2.0, empty)
     content["channels"]["drive_torque_fl"] = "/joint_states.effort.front_left"
     assert Profile.from_dict(content).apply(log)["drive_torque_fl"][1] == 2.0
+
+
+def test_efforts_of_which_nothing_states_the_unit_are_named(foreign: pd.DataFrame) -> None:
+    """`ros2-4wd` read a driver's amperes as N m without a word; what the log or the profile states is no question."""
+    names = {"rpm_left": "/joint_states.velocity.front_left", "rpm_right": "/joint_states.effort.front_left"}
+    log = foreign.rename(columns=names)
+    channels: dict[str, Any] = {"ground_speed": "kmh", "wheel_speed_fl": names["rpm_left"]}
+
+    def notes(effort: Any, log: pd.DataFrame = log) -> list[str]:
+        content = {"time": {"from": "stamp"}, "channels": channels | {"drive_torque_fl": effort}}
+        return [n for n in Profile.from_dict(content).apply(log).notes if "efforts of joints" in n]
+
+    (note,) = notes(names["rpm_right"])
+    assert note.startswith("drive_torque_fl are efforts of joints as N m")
+    assert "'unit: N m'" in note
+    assert len(notes({"from": names["rpm_right"], "sign": -1})) == 1
+    assert not notes({"from": names["rpm_right"], "unit": "N m"})
+    assert not notes({"from": names["rpm_right"], "scale": 2.1})
+    stated = f"{names['rpm_right']} [N m]"
+    assert not notes(stated, log.rename(columns={names["rpm_right"]: stated}))
 
 
 def test_a_velocity_on_the_axes_of_a_map_is_named(foreign: pd.DataFrame) -> None:

@@ -471,6 +471,16 @@ def test_an_effort_that_states_no_unit_may_be_a_current() -> None:
     assert not stated.doubt
 
 
+@pytest.mark.parametrize("size", [0.94, 1.0, 1.06])
+def test_two_speeds_over_ground_of_other_sizes_are_a_question(size: float) -> None:
+    """A radar 6 % off beside a receiver was proposed as surely as any, and slip was .06 off with a fifth of that as its interval."""
+    draws = np.random.default_rng(5)
+    noise = 0.02 * draws.standard_normal((2, len(TIME)))
+    columns = {"Radar Speed [m/s]": size * SPEED + noise[0], "GNSS Speed [km/h]": 3.6 * (SPEED + noise[1])}
+    speed = _propose(columns)["ground_speed"]
+    assert ("which of them has the right scale" in speed.doubt) is (size != 1.0)
+
+
 @pytest.mark.parametrize(
     ("name", "channel"), [("Zugkraft {} [kN]", "drawbar_force"), ("hitch vertical {} [kN]", "hitch_load")]
 )

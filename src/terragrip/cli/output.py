@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterable
@@ -38,7 +39,7 @@ def check_file(
         raise InputError(
             f"the folder {path.parent} does not exist", file=path, place=option, hint="make it first"
         )
-    _try_writing(path.parent)
+    _try_writing(path.parent, option)
     if path.exists() and not os.access(path, os.W_OK):
         raise InputError("is write-protected", file=path, place=option, hint="choose another name")
     return path
@@ -94,7 +95,7 @@ def _refuse_inputs(path: Path, inputs: Iterable[Path | None]) -> None:
             raise InputError("is an input too", file=path, place="--output", hint="choose another name")
 
 
-def _try_writing(folder: Path) -> None:
+def _try_writing(folder: Path, option: str = "--output") -> None:
     """Permission bits do not tell (root, read-only mounts, quotas): try it."""
     try:
         with tempfile.TemporaryFile(dir=folder) as trial:
@@ -103,6 +104,8 @@ def _try_writing(folder: Path) -> None:
         raise InputError(
             f"cannot be written ({error.strerror})",
             file=folder,
-            place="--output",
-            hint="choose another folder",
+            place=option,
+            hint="free space or choose another folder"
+            if error.errno == errno.ENOSPC
+            else "choose another folder",
         ) from error

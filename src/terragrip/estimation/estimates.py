@@ -293,7 +293,7 @@ def opened(path: str | os.PathLike[str], reading: Callable[[str], Any]) -> Any:
     try:
         return reading(os.fspath(path))
     except pa.ArrowInvalid as error:
-        hint = "write it again with 'terragrip estimate'"
+        hint = "give a file that 'terragrip estimate' wrote: a log is estimated first"
         if os.fspath(path).lower().endswith(".json"):
             hint = "a library of soils is given with --soils, a ground.json with --ground, beside files of estimates"
         raise InputError("is not a Parquet file, or is damaged", file=path, hint=hint) from error

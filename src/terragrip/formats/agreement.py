@@ -19,6 +19,8 @@ from terragrip.vehicle import Vehicle
 _KNOWN = ("Terragrip", "a signal")
 _E7 = re.compile(r"(?:^|[\W_\d]|lat|lon|lng|itude|deg)e-?7\W*$", re.IGNORECASE)
 _NOT_OF_WHEELS = 0.03  # of the speed: more than stamps and rounding leave of wheel odometry
+_TOGETHER = 0.9  # correlation of two speeds over ground; what they differ by then is no noise,
+_OTHER_SCALE, _OTHER_UNIT = 0.03, 0.5  # and a unit is asked for elsewhere
 _SIDEWAYS = 15.0  # m/s^2, the 90 % quantile
 
 
@@ -47,6 +49,7 @@ class Agreement:
             self._ground(ranked, assumed=True),
         )
         self._odometry(ranked)
+        self._two_scales(ranked)
         for channel in [c for c, guesses in ranked.items() if not guesses]:
             del ranked[channel]
 
@@ -60,6 +63,29 @@ class Agreement:
             if rest is not None and rest > _NOT_OF_WHEELS:
                 doubt = f"differs by {rest:.0%} from what the wheel speeds make of it: if a camera's or a lidar's, it is ground_speed?"
                 ranked["wheel_based_speed"][k] = replace(guess, confidence=0.4, doubt=doubt)
+
+    def _two_scales(self, ranked: Ranked) -> None:
+        """Of two speeds over ground that go together and are of other sizes one is of another scale; nothing shows which."""
+        best = surest(ranked, "ground_speed")
+        if (
+            best is None
+            or best.unit is None
+            or best.doubt
+            or best.unit_doubt
+            or not best.column.name.has("ground")
+        ):
+            return
+        for guess in ranked["ground_speed"]:
+            other = guess.column
+            if guess is best or guess.unit is None or not other.name.has("ground") or guess.doubt:
+                continue
+            size, alike = self._evidence.ratio(best.column.column, other.column) or (1.0, 0.0)
+            share = size * factor_to(best.unit, "m/s") / factor_to(guess.unit, "m/s")
+            if alike > _TOGETHER and _OTHER_SCALE < abs(share - 1) < _OTHER_UNIT:
+                doubt = f"is {share:.3g} times {other.column}: which of them has the right scale (a radar's angle)?"
+                place = next(i for i, g in enumerate(ranked["ground_speed"]) if g is best)
+                ranked["ground_speed"][place] = replace(best, doubt=doubt)
+                return
 
     def _positions(self, ranked: Ranked) -> None:
         """Latitudes and longitudes in radians or degrees: both have one unit."""

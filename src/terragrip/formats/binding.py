@@ -45,6 +45,16 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
             f"{columns} hold nothing but 0, as drivers do that measure no torque: {', '.join(silent)} are left out."
         )
         channels = {name: source for name, source in channels.items() if name not in silent}
+    plain = [
+        name
+        for name, one in efforts(channels).items()
+        if one.unit is None and abs(one.scale) == 1.0 and not any(c in log.units for c in one.columns)
+    ]
+    if plain:
+        notes.append(
+            f"{', '.join(plain)} are efforts of joints as N m, as ROS defines them; many drivers give a motor's current: ask yours. If "
+            "it is N m, 'unit: N m' in a profile says so; of a current write 'scale', the motor's constant times the gear ratio."
+        )
     for name, source in channels.items():
         origin = profile.channels[name]
         if len(origin.chain) > 1 or len(origin.candidates) > 1 or any("*" in c for c in origin.columns):

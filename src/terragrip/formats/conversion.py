@@ -19,6 +19,7 @@ from terragrip.formats.derivation import (
     pitch_of,
     quotient,
     roll_of,
+    unrolled,
     yaw_of,
 )
 from terragrip.formats.profile_parts import Rows, Source, matching, rate_unit
@@ -314,9 +315,7 @@ def _rate(origin: Source, log: LogTable, time: Floats, turn: float | None) -> tu
         along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
         result[fresh], deviation = derivative(when, where, origin.window, along)
     elif where.shape[1] == 1:
-        if turn is not None:
-            where = _unrolled(where[:, 0], turn)
-        result[fresh], deviation = derivative(when, where, origin.window)
+        result[fresh], deviation = derivative(when, unrolled(where[:, 0], turn), origin.window)
     else:
         rates = np.stack([derivative(when, p, origin.window)[0] for p in where.T], axis=1)
         result[fresh] = size = np.sqrt((rates**2).sum(axis=1))
@@ -362,11 +361,6 @@ def _heading_notes(name: str, origin: Source, log: LogTable, time: Floats) -> li
         f"The path of {axes} goes {np.degrees(abs(angle)):.0f} deg beside {yaw}: if the vehicle does not drive in crab, {name}, which is "
         f"taken along it, is {1 - np.cos(angle):.0%} too small: check the zero of {yaw}, {without}."
     ]
-
-
-def _unrolled(angle: Floats, turn: float) -> Floats:
-    """An angle (n,) that begins anew after each ``turn``, as a heading does, without these steps; a count of many turns as it is."""
-    return np.unwrap(angle, period=turn) if len(angle) and np.ptp(angle) <= 1.001 * turn else angle
 
 
 def _heading(origin: Source, log: LogTable, time: Floats) -> Floats:

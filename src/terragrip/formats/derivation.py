@@ -12,6 +12,7 @@ _FEWEST = 4  # points for a parabola with one to spare
 _ROUNDS = 3  # of reweighting, after which outlying positions no longer move
 _WIDEST = 100  # samples to either side of a window
 _FAR = 0.3  # of the longest way in a window: shorter ones show no direction
+_FILLED = 0.9  # of a counter's range: one that overflows has been near both of its ends
 _BLOCK = 20_000  # instants at once, to bound memory
 
 
@@ -24,6 +25,19 @@ def fresh_positions(time: Floats, positions: list[Floats]) -> Bools:
         moved = [fresh_samples(time, p, period) for p, period in held if period is not None]
         fresh &= np.any(moved, axis=0)
     return fresh
+
+
+def unrolled(angle: Floats, turn: float | None) -> Floats:
+    """An angle (n,) that begins anew after each ``turn``, as a heading does, or a count that does so at a power of two, as a counter of so
+    many bits does, without these steps; others as they are."""
+    span = float(np.ptp(angle)) if len(angle) else 0.0
+    if turn is not None and span <= 1.001 * turn:
+        return np.unwrap(angle, period=turn)
+    register = 2.0 ** np.ceil(np.log2(span + 1.0))
+    steps = np.abs(np.diff(angle))
+    if span < _FILLED * register or not np.any(steps > 0.5 * register) or np.any(angle != np.round(angle)):
+        return angle
+    return np.unwrap(angle, period=register)
 
 
 def quotient(time: Floats, dividend: Floats, divisor: Floats, least: float) -> Floats:

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from terragrip.arrays import Floats, Ints
+from terragrip.formats.derivation import unrolled
 from terragrip.physics.geodesy import metres_of
 from terragrip.units import STANDARD_GRAVITY, factor_to
 
@@ -234,12 +235,12 @@ class Evidence:
         good = steps <= _gap(time)
         return ((time[1:] + time[:-1]) / 2)[good], (np.diff(angle) / steps)[good]
 
-    def derivative(self, name: str, factor: float = 1.0) -> Series | None:
-        """The derivative of a column times ``factor``, over fresh values."""
+    def derivative(self, name: str, factor: float = 1.0, *, counts: bool = False) -> Series | None:
+        """The derivative of a column times ``factor``, over fresh values; of one that ``counts``, past its overflows."""
         result = self._fresh(name, 10)
         if result is None:
             return None
-        time, values = result[0], result[1] * factor
+        time, values = result[0], (unrolled(result[1], None) if counts else result[1]) * factor
         width = max(2, min(len(time) // 6, int(0.3 / max(float(np.median(np.diff(time))), 1e-3))))
         steps = time[width:] - time[:-width]
         good = steps <= width * _gap(time)

@@ -64,7 +64,7 @@ def _of_counts(
         counts = bool(_COUNT.intersection(read.words))
         others = frozenset().union(*(GENERAL.concepts_of(w) for w in read.words if w not in _COUNT))
         angle = read.has("position") and read.has("wheel") and column.kind in (None, "angle")
-        turning = evidence.derivative(name)
+        turning = evidence.derivative(name, counts=counts)
         if not read.wheel or not (counts or angle) or not others.isdisjoint(_NO_COUNT) or turning is None:
             continue
         time, rate = turning[0], np.abs(turning[1])

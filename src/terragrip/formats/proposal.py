@@ -42,6 +42,13 @@ def missing_channels(
         notes += _without_order(columns)
     if "ground_speed" not in proposals:
         notes.append("No ground speed is recognised: slip and resistance need it; positions will do.")
+    strange = [] if vehicle is None else sorted(set(wheels) - set(vehicle.wheels))
+    if strange and vehicle is not None:
+        notes.append(
+            f"The vehicle file has no wheel {', '.join(strange)}; its wheels are {', '.join(vehicle.wheels)}: name them alike in the "
+            "vehicle file or in a profile."
+        )
+        return notes
     # By the engine's torque, or slip alone, `estimate` needs no speed of each wheel.
     if wheels and vehicle is not None and any(name.startswith("drive_torque_") for name in proposals):
         notes += [

@@ -12,12 +12,12 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.held import known_part, quantum, usual_values
-from terragrip.recording.noise import white_noise
+from terragrip.recording.noise import MAD_TO_SD, white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
 from terragrip.recording.turns import filled
-from terragrip.written_times import span
+from terragrip.written_times import moment, span
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -37,6 +37,14 @@ _RANGED = ("drive_torque_", "drawbar_force", "acceleration_", "angular_velocity_
 _SHARE, _LEAST = 0.01, 20  # of the driving, and rows, that a channel is at the end of its range
 _OFTENER = 5.0  # than any other value
 _COMES = 10  # times to this value: a channel held or switched off there comes seldom
+_SLOWEST = 0.15  # s between samples: within more a force may go from end to end
+_WHOLE, _HALF = (
+    0.8,
+    0.5,
+)  # of all that a channel goes through: leaps from end to end, and what no other step is
+_EVEN = 0.9  # between the sizes of its ends: those of a signed number are alike
+_SWITCHED = 0.9  # of its end
+_STEADY = 5.0  # usual steps, by which a number that overflows goes on
 
 
 def frozen_warnings(recording: Recording) -> list[str]:
@@ -262,3 +270,39 @@ def _cut(name: str, time: Floats, values: Floats) -> list[str]:
         for value, beyond, times in ends
         if times >= _OFTENER * most
     ]
+
+
+def overflow_warnings(recording: Recording) -> list[str]:
+    """A sentence on the channels that go on from the greatest to the least value that they have, as a signed number does that overflows."""
+    channels = recording.channels.items()
+    found = {
+        name: seen
+        for name, values in channels
+        if name.startswith(_RANGED) and (seen := _overflows(recording.time, values))
+    }
+    return [
+        f"{', '.join(found)} {'leap' if len(found) > 1 else 'leaps'} from one end of the range to the other and back ({seen}): "
+        "a number that overflows. Record it with more bits or another scale, or leave these cells empty."
+        for seen in list(found.values())[:1]
+    ]
+
+
+def _overflows(time: Floats, values: Floats) -> str:
+    """How often a channel (n,) does, when first, and between which values; empty where it does not."""
+    when, what = known_part(time, values)
+    low, high = np.min(what, initial=0.0), np.max(what, initial=0.0)
+    if len(what) < 2 * _LEAST or min(-low, high) < _EVEN * max(-low, high):
+        return ""
+    steps = np.abs(np.diff(what))
+    leaps = (steps > _WHOLE * (high - low)) & (np.diff(when) <= _SLOWEST)
+    if np.count_nonzero(leaps) < _OFTEN or steps[~leaps].max() > _HALF * (high - low):
+        return ""
+    if (
+        np.count_nonzero(np.abs(what) > _SWITCHED * high) > len(what) / 2
+    ):  # one that is switched stays at its ends
+        return ""
+    # From there it goes on by steps as all others, were it not for the bits that are missing.
+    if median(high - low - steps[leaps]) > _STEADY * MAD_TO_SD * median(steps[~leaps]):
+        return ""
+    times, first = np.count_nonzero(leaps), float(when[np.argmax(leaps)])
+    return f"{times} times, first at {moment(first)} s, {low:.4g} to {high:.4g}"

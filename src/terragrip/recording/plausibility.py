@@ -22,7 +22,7 @@ from terragrip.recording.copies import copy_warnings, replay_warnings
 from terragrip.recording.counted import counted_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
-from terragrip.recording.frozen import cut_warnings, frozen_warnings
+from terragrip.recording.frozen import cut_warnings, frozen_warnings, overflow_warnings
 from terragrip.recording.held import measurable
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.leaps import leap_warnings
@@ -170,7 +170,7 @@ _WAY = (*_TIME, "against")
 """and takes it that rims and ground go one way."""
 _SPEEDS = (*_WAY, "reverse", "rescaled", "sides", "rims", "free axles")
 _COURSES = (*_SPEEDS, "positions")
-_FORCES = (*_WAY, "signs", "uneven torques", "motion", "acceleration", "zeros", "leaps")
+_FORCES = (*_WAY, "signs", "uneven torques", "motion", "acceleration", "zeros", "leaps", "overflows")
 
 _EACH = (
     Check("clock", lambda log: clock_warnings(log.whole, log.vehicle)),
@@ -236,7 +236,7 @@ _EACH = (
     Check(
         "motion",
         lambda log: motion_warnings(log.rows, log.any_vehicle, log.means_of_even_torques),
-        (*_WAY, "reverse", "signs"),
+        (*_WAY, "reverse", "signs", "overflows"),
         needs_wheels=False,
     ),
     Check(
@@ -275,6 +275,7 @@ _EACH = (
     Check("frozen", lambda log: frozen_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("dropouts", lambda log: dropout_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
+    Check("overflows", lambda log: overflow_warnings(log.whole), _TIME, needs_wheels=False),
     Check("replays", lambda log: replay_warnings(log.whole), _TIME, needs_wheels=False),
     Check("rest", lambda log: rest_warnings(log.rows), (*_WAY, "frozen", "dropouts"), needs_wheels=False),
     Check(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from terragrip.estimation.columns import column_named
 from terragrip.estimation.export.about import about_rows
+from terragrip.files import UNFINISHED
 from terragrip.recording.clock import clock_times
 
 if TYPE_CHECKING:
@@ -23,7 +26,8 @@ class Spreadsheet:
         import xlsxwriter
 
         # Rows go to disk as they come, so that a long sheet needs no memory.
-        self._book = xlsxwriter.Workbook(path, {"constant_memory": True, "tmpdir": str(path.parent)})
+        self._sheets = TemporaryDirectory(dir=path.parent, prefix=UNFINISHED)
+        self._book = xlsxwriter.Workbook(path, {"constant_memory": True, "tmpdir": self._sheets.name})
         self._bold = self._book.add_format({"bold": True})
         self._date = self._book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
         self._sheet = self._book.add_worksheet("estimates")
@@ -68,7 +72,12 @@ class Spreadsheet:
     def close(self) -> None:
         """Pack the sheets into the file."""
         self._book.close()
+        self._sheets.cleanup()
 
     def drop(self) -> None:
-        """Nothing is packed."""
+        """Nothing is packed, and nothing left."""
         self._book.fileclosed = True
+        for sheet in self._book.worksheets():
+            with suppress(OSError):  # what it still holds finds no room either
+                sheet.row_data_fh.close()
+        self._sheets.cleanup()
