@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from terragrip.cli import main
 from terragrip.cli.output import check_file, check_folder, files_in
 from terragrip.errors import InputError
 
@@ -157,3 +159,27 @@ sys.exit(main())
     run = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert (run.returncode, run.stdout) == (130, "")
     assert len(run.stderr.strip().splitlines()) == 1
+
+
+def test_a_folder_without_room_is_named_with_its_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """'--output' was named of every option, and another folder asked for where room would do."""
+
+    def full(**_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", full)
+    with pytest.raises(
+        InputError, match=r"--write-profile: cannot be written .*; free space or choose another folder"
+    ):
+        check_file(tmp_path / "p.yaml", option="--write-profile")
+
+
+def test_a_log_in_place_of_estimates_is_to_be_estimated_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`report log.csv` asked to write log.csv again."""
+    (tmp_path / "log.csv").write_text("time,ground_speed\n0,1\n")
+    assert main(["report", str(tmp_path / "log.csv"), "-o", str(tmp_path / "r.html")]) == 2
+    assert "a log is estimated first" in capsys.readouterr().err
