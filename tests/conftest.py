@@ -185,6 +185,8 @@ def _serve(session: pytest.Session, files: list[list[pytest.Item]], pipe: Connec
         number = pipe.recv()
         return [] if number is None else files[number]
 
+    # A background job ignores it, and the others end by it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.unregister(name="terminalreporter")
     config.pluginmanager.register(Relay())
     config._tmp_path_factory._basetemp = config._tmp_path_factory.mktemp(name, numbered=False)

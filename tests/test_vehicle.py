@@ -255,7 +255,7 @@ _base: dict[str, Any] = {
 _fields = tuple(Vehicle.model_fields)
 
 
-@settings(max_examples=80)  # fuzz/parsers.py searches at length
+@settings(max_examples=200)
 @given(st.dictionaries(st.sampled_from(_fields), _value, min_size=1, max_size=3))
 def test_any_mapping_is_a_vehicle_or_refused(changes: dict[str, Any]) -> None:
     try:

@@ -285,7 +285,7 @@ _content = st.binary(max_size=80) | (_text | _headed).flatmap(
 )
 
 
-@settings(max_examples=150)  # fuzz/parsers.py searches at length
+@settings(max_examples=500)
 @given(_content, st.booleans())
 def test_any_bytes_are_a_recording_or_refused(
     tmp_path_factory: pytest.TempPathFactory, content: bytes, packed: bool

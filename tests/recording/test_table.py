@@ -265,7 +265,7 @@ _columns = (
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=400)
 @given(st.dictionaries(_names, _columns, max_size=6))
 def test_any_table_is_a_recording_or_refused(table: dict[str, Any]) -> None:
     try:

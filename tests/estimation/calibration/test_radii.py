@@ -45,14 +45,14 @@ def test_the_radius_comes_out_with_the_slip_taken_off(drive: Make, vehicle: Vehi
 
 def test_intervals_of_the_radius_hold(drive: Make, vehicle: Vehicle) -> None:
     z = []
-    for seed in range(10):
+    for seed in range(5):
         logs = [
             free_pass(drive, 0.197, seed, noise=1.0),
             drive(120, radius=0.197, slip=(0.0, 0.25), seed=seed, noise=1.0, patches=0.05),
         ]
         quantity = calibrate(logs, vehicle)["wheel_radius rl"]
         z.append((quantity.value - 0.197) / (quantity.factor * quantity.std))
-    assert np.mean(np.abs(z) < 1) >= 0.9
+    assert np.all(np.abs(z) < 1)
 
 
 def test_a_pass_alone_keeps_the_curve_open_and_says_so_in_the_interval(drive: Make, vehicle: Vehicle) -> None:

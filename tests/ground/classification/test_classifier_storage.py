@@ -82,7 +82,7 @@ def test_a_stored_classifier_needs_no_scikit_learn(content: bytes, tmp_path: Pat
     assert "pip install 'terragrip[ground]'" in second
 
 
-@settings(max_examples=30)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_says_the_same(
     classifier: GroundClassifier,
