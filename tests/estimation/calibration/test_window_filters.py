@@ -266,6 +266,13 @@ def test_of_stops_the_most_that_agree_count_and_of_as_many_those_nearest_to_zero
     assert resting(windows, unread, five, count, 0.0, MOST) == five[:4]
 
 
+def test_of_two_stops_that_agree_the_longer_one_counts_too() -> None:
+    """It is surer than the middle between both: of 25 and 400 samples with noise of 1 the errors are .2 and .05."""
+    windows, values, both = readings(0.0, 0.5)
+    count = np.repeat([6.25, 100.0], [6, 34])
+    assert resting(windows, values, both, count, 1.0, MOST) == both
+
+
 def test_where_one_wheel_holds_the_vehicle_no_wheel_reads_its_zero() -> None:
     windows, values, stops = readings(0.2, 0.2, 0.2, columns=(1.0, 50.0))
     assert resting(windows, values, stops, np.full(40, 100.0), 1.0, np.array([1.0, 9.0])) == []

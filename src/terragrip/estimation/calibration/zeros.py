@@ -124,14 +124,17 @@ def resting(
     if not stops:
         return []
     means = np.array([stop_means(values, spell) for spell in stops])
-    errors = noise / np.sqrt([max(1.0, count[spell].sum()) for spell in stops])
+    samples = np.array([max(1.0, count[spell].sum()) for spell in stops])
+    errors = noise / np.sqrt(samples)
     alike = np.ones((len(stops), len(stops)), dtype=bool)
     if noise > 0:
         apart = np.max(np.abs(means[:, None] - means[None]), axis=2)
         alike = apart < _ALIKE * np.hypot(errors[:, None], errors[None])
     groups = []
     for of_one, mean in zip(alike, means, strict=True):
-        away = np.max(np.abs(means - np.median(means[of_one], axis=0)), axis=1)
+        # Of two stops' median the longer, surer one would be further off than its error.
+        middle = np.average(means[of_one], axis=0, weights=samples[of_one])
+        away = np.max(np.abs(means - middle), axis=1)
         members = [
             spell
             for spell, error, d in zip(stops, errors, away, strict=True)
