@@ -35,7 +35,7 @@ _BEYOND = 3.0  # standard deviations of what the balance is left with all the ti
 _STEPS = 1.5  # of a channel's resolution: one step of it is no leap
 _HALF = 0.5  # of it, at least, is between two samples
 _REST = 0.25  # of it, at most, is answered, or gone again
-_SLIPS = 0.05  # of slip, at least, by which wheels answer
+_SLIPS = 1.5  # standard deviations by which slip goes with it: one of 15 moved zeros is not named for it
 _SOON = 1.0  # s before and after: a tool's pull, or a start into other soil, leaps in part and is answered while it still changes
 
 
@@ -146,10 +146,10 @@ def _unanswered(
     rows &= np.abs(
         total[np.searchsorted(drive.middle, drive.middle + _SOON)] - total[first] - leap
     ) < _HALF * np.abs(leap)
-    # Wheels that slip less by as much as they push less push less: the ground resists less from one metre to the next.
+    # Wheels that slip less as they push less push less: the ground resists less from one metre to the next.
     turned = drive.shift(slip)
     known = MAD_TO_SD * median(np.abs(turned[drive.inside]))
-    rows &= ~(turned * leap > np.maximum(_BEYOND * known, _SLIPS) * np.abs(leap))
+    rows &= ~(turned * leap > _SLIPS * known * np.abs(leap))
     found: dict[tuple[str, ...], list[int]] = {}
     for k in np.flatnonzero(rows):
         found.setdefault(tuple(name for name in parts if leaps[name][k]), []).append(int(k))
