@@ -3,10 +3,11 @@
     python benchmarks/bench_left_out.py [--data ../shared/data] [--only NAME] [--write]
 
 The ground speed (and positions) for STRETCH of every EVERY seconds, begun at four instants in turn, so that all of the log is left out
-once; and every second sample of the ground speed, of a wheel's speed, of a wheel's torque. Where a speed was left out and the machine
+once; so the yaw rate, one wheel's speed and one wheel's torque, here and on development machines (simulation); and every second sample of
+the ground speed, of a wheel's speed, of a wheel's torque. Where a speed was left out and the machine
 does not stand, the measured value should lie within 1.96 SD of the estimate in 95 % of rows, by the estimate's SD and the channel's
 noise. A torque is no estimate: there the adhesion with it should lie within 1.96 SD of the one without, of which the variance is the
-difference of both.
+difference of both. Slips without a yaw rate should lie within 1.96 SD of those with it.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from terragrip.cli import main as terragrip
 from terragrip.estimation import Estimates, TractionEstimator, estimate
 from terragrip.formats import read
 from terragrip.recording import Recording
+from terragrip.simulation.families import draw, machines
 from terragrip.vehicle import Vehicle
 
 Floats = npt.NDArray[np.float64]
@@ -35,6 +37,8 @@ Flags = npt.NDArray[np.bool_]
 
 EVERY, STRETCH, FIRST = 20.0, 5.0, 10.0
 """s"""
+MACHINES, SEED, RATE = 4, 8999500, 50.0
+"""Development machines, simulated, whose channels are left out, too; Hz."""
 POSITIONS = ("latitude", "longitude", "altitude")
 SLOW = 0.05
 """m/s: rows in which both the measured and the estimated speed are slower show nothing."""
@@ -92,13 +96,62 @@ def rims(log: Recording, vehicle: Vehicle) -> Floats:
     return np.mean([radius[n] * np.interp(log.time, log.time[k], log[n][k]) for n, k in known], axis=0)
 
 
+def silences(log: Recording) -> list[Flags]:
+    """Rows left out, for each of the instants at which a stretch begins."""
+    time = log.time - log.time[0]
+    return [((time - k) % EVERY < STRETCH) & (time >= FIRST) for k in np.arange(0, EVERY, STRETCH)]
+
+
+def gone(
+    log: Recording, vehicle: Vehicle, left: str, column: str, with_all: Estimates, noise: float
+) -> Floats:
+    """Rows (k, 2) in which a channel was left out for a stretch: error of a column and its SD, of the measured channel if it is that, else
+    of the estimates with all channels. SD NaN: not estimated, which is said there."""
+    parts = [np.empty((0, 2))]
+    for out in silences(log):
+        less = estimate(without(log, (left,), out), vehicle)
+        if column not in less:
+            continue
+        spread = less[f"{column}_std"]
+        variance, true = spread**2 + noise**2, log[left]
+        if column != left:
+            own = with_all[f"{column}_std"] ** 2 if column.startswith("adhesion") else 0.0
+            variance, true = spread**2 - own, with_all[column]
+        rows = out & moves(less, "ground_speed", log["ground_speed"]) & np.isfinite(true) & ~(variance <= 0)
+        parts.append(np.stack([(true - less[column])[rows], np.sqrt(variance[rows])], axis=1))
+    return np.concatenate(parts)
+
+
+def others(log: Recording, vehicle: Vehicle) -> str:
+    """Cells: slips without the yaw rate, wheels' speeds, the share of rows that have none, adhesions without a torque."""
+    noise = TractionEstimator.for_recording(log, vehicle).noise
+    with_all, wheels = estimate(log, vehicle), vehicle.wheels
+    pairs = (
+        [("angular_velocity_z", f"slip_{w}") for w in wheels],
+        [(f"wheel_speed_{w}", f"wheel_speed_{w}") for w in wheels],
+        [(f"drive_torque_{w}", f"adhesion_{w}") for w in wheels],
+    )
+    cells = []
+    for k, group in enumerate(pairs):
+        parts = [
+            gone(log, vehicle, left, column, with_all, noise[left])
+            for left, column in group
+            if left in log.channels and column in with_all
+        ]
+        values = np.concatenate([np.empty((0, 2)), *parts])
+        known = np.isfinite(values).all(axis=1)
+        cells.append(share(values[known]))
+        if k == 1:
+            cells.append(f"{1 - known.mean():.0%}" if len(known) else "-")
+    return " | ".join(cells)
+
+
 def stretches(log: Recording, vehicle: Vehicle, noise: float) -> Floats:
     """Of rows whose ground speed was left out (k, 4): error of the estimate, its SD with the noise, errors of the last measured speed and
     of the rims."""
-    time, measured, by_rims = log.time - log.time[0], log["ground_speed"], rims(log, vehicle)
+    measured, by_rims = log["ground_speed"], rims(log, vehicle)
     parts = [np.empty((0, 4))]
-    for offset in np.arange(0, EVERY, STRETCH):
-        out = ((time - offset) % EVERY < STRETCH) & (time >= FIRST)
+    for out in silences(log):
         estimates = estimate(without(log, ("ground_speed", *POSITIONS), out), vehicle)
         rows = out & np.isfinite(measured) & moves(estimates, "ground_speed", measured)
         kept = np.flatnonzero(np.isfinite(measured) & ~out)
@@ -154,7 +207,7 @@ def share(values: Floats) -> str:
 
 
 def tables(data: Path, only: str) -> dict[str, str]:
-    """Both tables by name."""
+    """The tables by name."""
     head = ("data", "log", "rows", "held", "half the interval (m/s)", "RMS: estimate", "last speed", "rims")
     one = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     head = ("data", "log", "ground speed", "one wheel's speed", "one wheel's torque")
@@ -178,7 +231,24 @@ def tables(data: Path, only: str) -> dict[str, str]:
         cells = [share(np.concatenate([np.empty((0, 2)), *part])) for part in parts]
         two.append(f"| {source.name} | {name} | {' | '.join(cells)} |")
         print(two[-1], flush=True)
-    return {"stretches left out": "\n".join(one), "samples left out": "\n".join(two)}
+    return {"stretches left out": "\n".join(one), "samples left out": "\n".join(two)} | others_table(
+        data, only
+    )
+
+
+def others_table(data: Path, only: str) -> dict[str, str]:
+    """The table of the other channels left out for a stretch, by name; development machines first."""
+    head = ("data", "log", "yaw rate: slips", "one wheel's speed", "not estimated", "one wheel's torque")
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for kind, seed in machines("development", MACHINES, SEED):
+        run = draw(kind, seed, rate=RATE)
+        lines.append(f"| simulation | {kind}, {seed} | {others(run.recording, run.vehicle)} |")
+        print(lines[-1], flush=True)
+    for source, name, log, vehicle in logs(data, only):
+        if source.prepare is not windows_joined:
+            lines.append(f"| {source.name} | {name} | {others(log, vehicle)} |")
+            print(lines[-1], flush=True)
+    return {"other stretches left out": "\n".join(lines)}
 
 
 def main() -> None:
