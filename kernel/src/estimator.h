@@ -258,6 +258,7 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row);
 void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt);
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q);
 
+#define TG_SAMPLE_AGE ((tg_real)0.288675)    /* sqrt(1/12) intervals: a sample may be of any instant of its own */
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
 
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */

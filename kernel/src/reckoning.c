@@ -17,13 +17,18 @@ void tgi_reset_slips(tg_estimator *e)
     m->way = e->settings.tuned.uneven_memory;
 }
 
-/* Mean rim speed, of this row where it measures it (row null: as believed), and mean adhesion over the load, along the travel. A wheel that
+typedef struct { /* rims, along the travel */
+    tg_real mean, square; /* of their speeds; a turn is taken off the mean alone, since each rim slips as it turns itself */
+} rims;
+
+/* Rim speeds, of this row where it measures them (row null: as believed), and mean adhesion over the load, along the travel. A wheel that
  * is silent itself says nothing of the ground speed, unless all are: its belief follows from the ground speed. What a turn adds to the rim
  * is taken off: the wheels that are measured may be those of one side. */
-static void means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *rim, tg_real *adhesion)
+static rims means(const tg_estimator *e, const tg_row *row, const tg_drive *drive, tg_real *adhesion)
 {
     const int32_t n = e->settings.machine.wheels;
-    tg_real load = 0, pull = 0, speed = 0, believed = 0;
+    tg_real load = 0, pull = 0;
+    rims counting = {0, 0}, all = {0, 0};
     int32_t counted = 0;
     for (int32_t i = 0; i < n; i++) {
         load += drive->load[i];
@@ -31,13 +36,18 @@ static void means(const tg_estimator *e, const tg_row *row, const tg_drive *driv
         const int32_t known = row && !isnan(row->value[TG_WHEEL_SPEED + i]) && !(row->doubt[i] > 0);
         const tg_real omega = known ? (tg_real)e->direction * row->value[TG_WHEEL_SPEED + i] : e->belief.x[n + 2 + i];
         const int32_t counts = !tgi_rolls(e, i) && (!row || known || row->time - e->wheel[i].time <= (double)e->settings.tuned.silence);
-        const tg_real middle = e->settings.rolling_radius[i] * omega + (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
-        speed += counts ? middle : 0;
-        believed += middle;
+        const tg_real rim = e->settings.rolling_radius[i] * omega, middle = rim + (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
+        all.mean += middle / (tg_real)n;
+        all.square += rim * rim / (tg_real)n;
+        counting.mean += counts ? middle : 0;
+        counting.square += counts ? rim * rim : 0;
         counted += counts;
     }
-    *rim = counted ? speed / (tg_real)counted : believed / (tg_real)n;
     *adhesion = pull / load;
+    if (!counted) return all;
+    counting.mean /= (tg_real)counted;
+    counting.square /= (tg_real)counted;
+    return counting;
 }
 
 /* Slip at another adhesion than this one, on the same soil: along the tangent of the prototype curve. */
@@ -62,17 +72,18 @@ static tg_real since_ground(const tg_estimator *e, tg_real dt)
     return tgi_max(dt, e->ground.interval < e->settings.gap ? e->ground.interval : e->settings.gap);
 }
 
-/* A row whose ground speed v was measured, at the mean rim speed and adhesion, both along the travel, and the usual slip there. */
-static void remember(tg_estimator *e, tg_real rim, tg_real v, tg_real adhesion, tg_real usual, tg_real dt)
+/* A row whose ground speed v was measured, at the rims' speeds and mean adhesion, along the travel, and the usual slip there. */
+static void remember(tg_estimator *e, rims rim, tg_real v, tg_real adhesion, tg_real usual, tg_real dt)
 {
     const tg_tuned *const k = &e->settings.tuned;
     tgi_slip_memory *m = &e->slip_memory;
-    if (rim < 3 * e->settings.standstill_speed) return;
-    tg_real slip = 1 - v / rim, gain = dt / (k->slip_memory + dt);
+    if (rim.mean < 3 * e->settings.standstill_speed) return;
+    tg_real slip = 1 - v / rim.mean, gain = dt / (k->slip_memory + dt);
     if (slip < (tg_real)-0.2) slip = (tg_real)-0.2;
     m->slip += gain * (slip - m->slip);
     m->adhesion += gain * (adhesion - m->adhesion);
-    const tg_real travelled = rim * since_ground(e, dt) / e->constants.mean_radius, away = slip - usual;
+    const tg_real travelled = rim.mean * since_ground(e, dt) / e->constants.mean_radius;
+    const tg_real away = (slip - usual) * rim.mean / tgi_sqrt(tgi_max(rim.square, tgi_square(rim.mean))); /* of each rim's speed */
     m->way = m->way + travelled < k->hill_memory ? m->way + travelled : k->hill_memory;
     const tg_real share = travelled < m->way ? travelled / m->way : 1, most = 2 * tgi_sqrt(m->apart); /* spinning wheels are not the rule */
     m->usual += share * (away > most ? most : away < -most ? -most : away);
@@ -95,12 +106,12 @@ static void doubt_slip(tg_estimator *e, tg_real rim, tg_real variance)
 }
 
 /* Ground speed along the travel at these rims and adhesion, with the usual slip there, and its variance. */
-static tg_real reckoned_at(const tg_estimator *e, tg_real rim, tg_real adhesion, tg_real usual, tg_real keep, tg_real *variance)
+static tg_real reckoned_at(const tg_estimator *e, rims rim, tg_real adhesion, tg_real usual, tg_real keep, tg_real *variance)
 {
     const tgi_slip_memory *const m = &e->slip_memory;
     const tg_real last = slip_at(&e->settings.tuned, m->slip, m->adhesion, adhesion);
-    *variance = tgi_square(rim) * (1 - keep) * (m->apart + keep * tgi_square(last - usual));
-    return rim * (1 - usual - keep * (last - usual));
+    *variance = rim.square * (1 - keep) * (m->apart + keep * tgi_square(last - usual));
+    return rim.mean * (1 - usual - keep * (last - usual));
 }
 
 /* After a ground speed: its innovation, the variance of that, and the gain. What it drew the estimate by is summed over a gap's time. */
@@ -139,11 +150,11 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     tgi_slip_memory *const m = &e->slip_memory;
     const tg_real v = e->belief.x[e->settings.machine.wheels + 1];
     const tg_real since = since_ground(e, dt);
-    tg_real rim, adhesion, variance;
-    means(e, NULL, drive, &rim, &adhesion);
-    const tg_real keep = m->astray ? go_unseen(e, rim, since) : 1;
+    tg_real adhesion, variance;
+    const rims rim = means(e, NULL, drive, &adhesion);
+    const tg_real keep = m->astray ? go_unseen(e, rim.mean, since) : 1;
     const tg_real usual = usual_at(e, adhesion), off = tgi_square(v - reckoned_at(e, rim, adhesion, usual, keep, &variance));
-    variance += tgi_square(rim) * (tgi_square(TG_STEADY_SLIP) + tgi_square(m->slip / 4)) + e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
+    variance += tgi_square(rim.mean) * (tgi_square(TG_STEADY_SLIP) + tgi_square(m->slip / 4)) + e->constants.variance[TG_GROUND_SPEED] + tgi_square(e->settings.standstill_speed);
     m->agreeing = off < variance && !m->contrary ? m->agreeing + since : 0;
     m->calm = m->unusual || m->contrary ? 0 : m->calm + since;
     const int32_t before = m->against > 0; /* one reading may be a spike */
@@ -152,7 +163,7 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
     else if (m->agreeing > TG_AGREED || m->calm > TG_CALM) m->astray = 0;
     if (!m->astray) {
         remember(e, rim, v, adhesion, usual, dt);
-        doubt_slip(e, rim, e->belief.P[(e->settings.machine.wheels + 1) * (tgi_stride(e->settings.machine.wheels) + 1)]);
+        doubt_slip(e, rim.mean, e->belief.P[(e->settings.machine.wheels + 1) * (tgi_stride(e->settings.machine.wheels) + 1)]);
     }
     e->scene.astray = m->astray ? off + variance : 0;
 }
@@ -160,8 +171,8 @@ void tgi_remember_slip(tg_estimator *e, const tg_drive *drive, tg_real dt)
 /* Whether the row's ground speed is to be reckoned, after so many seconds of silence; if it is measured, the silence is over. */
 static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_real silence)
 {
-    e->scene.reckoned = 0;
     if (!isnan(row->value[TG_GROUND_SPEED])) {
+        e->scene.reckoned = 0;
         e->ground_time = row->time;
         if (!e->slip_memory.astray) e->slip_memory.unseen = 0;
         return 0;
@@ -179,10 +190,11 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
     if (!is_missing(e, row, dt, k->silence)) return;
     e->scene.astray = 0;
     if (e->standing && e->slope.running) tgi_slope_correct(&e->slope, 0, tgi_square(e->settings.standstill_speed) * (1 + 2 * k->alike / dt));
+    e->scene.reckoned = 0;
     if (!goes) return;
-    tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, rim, adhesion, variance;
-    means(e, row, drive, &rim, &adhesion);
-    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), &variance);
+    tg_real alike = k->alike, force = k->reckoned_force * e->constants.force_walk, adhesion, variance;
+    const rims rim = means(e, row, drive, &adhesion);
+    tg_real speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim.mean, dt), &variance);
     variance += tgi_square((tg_real)0.01);
     e->scene.reckoned = variance;
     if (e->slope.running) {
@@ -200,16 +212,18 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
     q[e->settings.machine.wheels] += force * dt + tgi_square(change) / 12;
 }
 
-/* Mean rim speed along the travel, of this row where it measures it, for speeds alone. */
-static tg_real rim_of_speeds(const tg_estimator *e, const tg_row *row)
+/* Rims along the travel, of this row where it measures them (row null: as believed), for speeds alone. */
+static rims rims_of_speeds(const tg_estimator *e, const tg_row *row)
 {
     const int32_t n = e->settings.machine.wheels;
-    tg_real sum = 0;
+    rims rim = {0, 0};
     for (int32_t i = 0; i < n; i++) {
-        const tg_real omega = row->value[TG_WHEEL_SPEED + i];
-        sum += isnan(omega) ? e->speeds.x[0] + e->speeds.x[2 + i] : e->settings.rolling_radius[i] * omega;
+        const tg_real omega = row ? row->value[TG_WHEEL_SPEED + i] : (tg_real)NAN;
+        const tg_real speed = isnan(omega) ? e->speeds.x[0] + e->speeds.x[2 + i] : e->settings.rolling_radius[i] * omega;
+        rim.mean += (tg_real)e->direction * speed / (tg_real)n;
+        rim.square += speed * speed / (tg_real)n;
     }
-    return (tg_real)e->direction * sum / (tg_real)n;
+    return rim;
 }
 
 /* The same for speeds alone, where the slip is that of one adhesion, and which need no help between the samples of a slow receiver. A
@@ -221,8 +235,10 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
     if (!is_missing(e, row, dt, silence) || e->speeds.seen[0] == 0 || e->speeds.open != 0) return;
     tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;
     if (!e->standing) {
-        const tg_real rim = rim_of_speeds(e, row), adhesion = e->settings.prior_adhesion;
-        speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim, dt), &variance);
+        const rims rim = rims_of_speeds(e, row);
+        const tg_real adhesion = e->settings.prior_adhesion;
+        speed = (tg_real)e->direction * reckoned_at(e, rim, adhesion, usual_at(e, adhesion), go_unseen(e, rim.mean, dt), &variance);
+        variance += tgi_square(TG_SAMPLE_AGE * (rim.mean - rims_of_speeds(e, NULL).mean)); /* of one instant they are not */
     }
     e->scene.reckoned = variance;
     row->value[TG_GROUND_SPEED] = speed;
@@ -232,8 +248,9 @@ void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
 
 void tgi_remember_speeds(tg_estimator *e, const tg_row *row, tg_real dt)
 {
-    const tg_real rim = rim_of_speeds(e, row), adhesion = e->settings.prior_adhesion;
+    const rims rim = rims_of_speeds(e, row);
+    const tg_real adhesion = e->settings.prior_adhesion;
     if (row->reckoned || isnan(row->value[TG_GROUND_SPEED])) return;
     remember(e, rim, (tg_real)e->direction * e->speeds.x[0], adhesion, usual_at(e, adhesion), dt);
-    doubt_slip(e, rim, e->speeds.P[0][0]);
+    doubt_slip(e, rim.mean, e->speeds.P[0][0]);
 }

@@ -5,8 +5,6 @@
  * correlated, and with white noise they are not. */
 #include "estimator.h"
 
-#define TG_SAMPLE_AGE ((tg_real)0.288675) /* sqrt(1/12) intervals: a sample may be of any instant of its own */
-
 /* At rest: `row` may hold one more reading. */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row)
 {

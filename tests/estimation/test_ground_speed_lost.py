@@ -325,3 +325,51 @@ def test_the_slip_of_a_start_is_not_believed_until_the_receiver_is_back() -> Non
         off.append(np.mean(error**2))
     assert np.mean(inside) > 0.92
     assert np.sqrt(np.mean(off)) < 0.03
+
+
+@pytest.mark.parametrize(("imu", "torques"), [(True, True), (False, True), (False, False)])
+def test_a_row_in_which_nothing_is_measured_is_as_unsure_as_those_beside_it(imu: bool, torques: bool) -> None:
+    """Rows of a receiver that is silent: the interval of the row before holds on."""
+    made = drive(80.0, rate=20.0, imu=imu, slip=soils)
+    log = {n: v for n, v in made.recording.channels.items() if torques or "torque" not in n}
+    log["ground_speed"] = np.where(made.recording.time > LOST, np.nan, log["ground_speed"])
+    between = np.sort(np.r_[made.recording.time, made.recording.time[1:] - 0.025])
+    own = np.isin(between, made.recording.time)
+    spaced = {n: np.full(len(between), np.nan) for n in log}
+    for name, values in log.items():
+        spaced[name][own] = values
+    spread = estimate(Recording(between, spaced), robot())["ground_speed_std"]
+    late = np.flatnonzero(~own & (between > LOST + 5))
+    assert np.min(spread[late] / spread[late - 1]) > 0.9
+
+
+def test_a_turn_on_the_spot_is_no_speed_that_is_known() -> None:
+    """The sides' rims cancel, but each slips: .05 to .2 of its own speed."""
+    made = drive(80.0, rate=20.0, slip=soils)
+    log, time = dict(made.recording.channels), made.recording.time
+    spot = time > LOST + 5
+    log["ground_speed"] = np.where(time > LOST, np.nan, log["ground_speed"])
+    for wheel in WHEELS:
+        side = -1.0 if wheel.endswith("l") else 1.0
+        log[f"wheel_speed_{wheel}"] = np.where(spot, side * 3.0, log[f"wheel_speed_{wheel}"])
+    bare = {n: v for n, v in log.items() if "torque" not in n}
+    spread = estimate(Recording(time, bare), robot())["ground_speed_std"]
+    rim = 3.0 * RADIUS
+    assert np.min(spread[spot & (time > LOST + 8)]) > 0.03 * rim
+
+
+def test_rims_that_change_from_row_to_row_are_of_no_certain_instant() -> None:
+    """Speeds alone at 1 Hz, the rims' of any instant within half a second; steady as long as the receiver speaks."""
+    draws, time = np.random.default_rng(3), np.arange(600.0)
+
+    def speed(t: Any) -> Any:
+        return 2 - 0.75 * (t > 10) * np.clip(np.sin((t % 20) * np.pi / 5), 0, 1) * (t % 20 < 5)
+
+    rims = speed(time + draws.random(600) - 0.5) / 0.95 / RADIUS
+    log = {f"wheel_speed_{w}": rims + 0.03 * draws.standard_normal(600) for w in WHEELS}
+    silent = (time % 20 < 5) & (time > 10)
+    log["ground_speed"] = np.where(silent, np.nan, speed(time) + 0.02 * draws.standard_normal(600))
+    estimates = estimate(Recording(time, log), robot())
+    late = silent & (time % 20 >= 2)
+    error = np.abs(estimates["ground_speed"] - speed(time))[late]
+    assert np.mean(error < 1.96 * estimates["ground_speed_std"][late]) > 0.75

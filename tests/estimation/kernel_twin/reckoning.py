@@ -18,6 +18,10 @@ SLIP_MEMORY, UNEVEN, HILLS = 0.3, 40.0, 1000.0
 """s of the last slip; wheel radii over which it tells of the ground, and over which the usual one is learned at most."""
 
 
+AGE = 0.288675
+"""Of an interval: a rim's sample may be of any instant of it."""
+
+
 @dataclass
 class Reckoning:
     """``radius`` [m], ``standstill`` [m/s], ``gap`` [s]: as the estimator's."""
@@ -48,27 +52,30 @@ class Reckoning:
         patience = max(SILENCE, min(2 * self.interval, self.gap))
         if not self.seen or self.silent < patience or not np.isfinite(speeds).any() or dt == 0:
             return None
-        rim = _mean(speeds, rims)
+        rim, square = _mean(speeds, rims)
         self.unseen += abs(rim) * dt / self.radius
         keep = np.exp(-self.unseen / UNEVEN) * self.apart / (self.apart + self.error)
         spread = (1 - keep) * (self.apart + keep * (self.last - self.usual) ** 2)
-        return rim * (1 - self.usual - keep * (self.last - self.usual)), rim**2 * spread
+        aged = (AGE * (rim - np.mean(rims))) ** 2
+        return rim * (1 - self.usual - keep * (self.last - self.usual)), square * spread + aged
 
     def remember(self, dt: float, v: float, variance: float, speeds: Floats, rims: Floats) -> None:
         """After a row whose ground speed was measured: ``v``, its ``variance`` and ``rims`` as estimated."""
-        rim = _mean(speeds, rims)
+        rim, square = _mean(speeds, rims)
         self.error = variance / max(abs(rim), 3 * self.standstill) ** 2
         if rim < 3 * self.standstill:
             return
         slip = max(1 - v / rim, -0.2)
         self.last += dt / (SLIP_MEMORY + dt) * (slip - self.last)
         travelled = rim * max(dt, min(self.interval, self.gap)) / self.radius
-        away = slip - min(max(self.usual, -0.2), 0.8)
+        away = (slip - min(max(self.usual, -0.2), 0.8)) * rim / np.sqrt(max(square, rim**2))
         self.way = min(self.way + travelled, HILLS)
         share, most = min(travelled / self.way, 1.0), 2 * np.sqrt(self.apart)
         self.usual += share * float(np.clip(away, -most, most))
         self.apart += share * (away**2 - self.apart)
 
 
-def _mean(speeds: Floats, rims: Floats) -> float:
-    return float(np.mean(np.where(np.isfinite(speeds[1:]), speeds[1:], rims)))
+def _mean(speeds: Floats, rims: Floats) -> tuple[float, float]:
+    """Mean and mean square."""
+    now = np.where(np.isfinite(speeds[1:]), speeds[1:], rims)
+    return float(np.mean(now)), float(np.mean(now**2))

@@ -63,7 +63,9 @@ class SpeedsFilter:
     reckoning: Reckoning | None = None
     """Of a silent ground speed; None: never."""
     reckoned: float = field(init=False, default=0.0)
-    """Variance of this row's reckoned ground speed, else 0."""
+    """Variance of this row's reckoned ground speed, else 0,"""
+    doubt: float = field(init=False, default=0.0)
+    """and of the last one, until the next measured ground speed."""
 
     @property
     def slow(self) -> float:
@@ -72,7 +74,7 @@ class SpeedsFilter:
         alike = max(self.alike - chance, 0.0) if self.alike > 0 else 0.0
         left = min(self.noise[0] ** 2 / self.expected, 1.0) if alike else 0.0  # 1 - gain
         alike *= left * (1 + left * (1 - left))
-        return (SLOW_SHARE * self.noise[0]) ** 2 + alike + max(self.reckoned - self.covariance[0, 0], 0.0)
+        return (SLOW_SHARE * self.noise[0]) ** 2 + alike + max(self.doubt - self.covariance[0, 0], 0.0)
 
     def __post_init__(self) -> None:
         size = len(self.noise) + 1
@@ -86,8 +88,9 @@ class SpeedsFilter:
         """Go ``dt`` [s] on and take samples (1 + wheels,) [m/s] of ground speed and rims, NaN where not measured."""
         self.nis, self.channels, self.weight, self.reckoned = 0.0, 0, np.ones(len(self.noise)), 0.0
         measured, noise = bool(np.isfinite(speeds[0])), self.noise.copy()
+        self.doubt = 0.0 if measured else self.doubt
         if self.reckoning and (made := self.reckoning.speed(dt, speeds, self.state[0] + self.state[2:])):
-            self.reckoned = made[1]
+            self.reckoned = self.doubt = made[1]
             speeds = np.r_[made[0], speeds[1:]]
             noise[0] = np.sqrt(made[1])
         if not self.begun:
