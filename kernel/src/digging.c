@@ -121,6 +121,11 @@ int32_t tgi_digging_update(tg_estimator *e, double time, const tgi_view *row)
     d->points[TG_SIGN_LEADING] = bounded(leading / one_point(s->change, now[TGI_BALANCE_DEVIATION]), -s->most, s->most);
     d->points[TG_SIGN_RESISTANCE] = bounded(resistance / one_point(s->resistance, unsure), -s->most, s->most);
     d->points[TG_SIGN_COMMAND] = -bounded(command, 0, 2 * s->most);
+    /* A mean keeps no more than makes all points: else it holds the rims and slips of a start for three units of time. */
+    const tg_real full = 2 * s->most * s->command, below = slip + s->most * one_point(s->change, deviation);
+    d->mean[TGI_RIM] = tgi_max(mean[TGI_RIM], now[TGI_RIM] - full);
+    d->mean[TGI_TRAVEL] = tgi_max(mean[TGI_TRAVEL], now[TGI_TRAVEL] - full);
+    if (mean[TGI_SLIP] > below) d->mean[TGI_SLIP] = below;
     tg_real sum = 0;
     for (int32_t k = 0; k < TG_SIGNS; k++) sum += d->points[k];
     d->score = low_pass(d->score, since < e->constants.pace ? since : e->constants.pace, s->memory * e->constants.pace, sum);

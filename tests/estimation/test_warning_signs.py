@@ -94,6 +94,18 @@ def test_a_command_takes_points_off_and_a_slower_one_half_as_many(gain: float, o
     assert table["warning_command"][-1] == pytest.approx(-expected, rel=0.06)
 
 
+def test_a_start_takes_points_off_for_no_longer_than_another_command() -> None:
+    """From rest to .5 m/s in a second: all points off at its end, and as those of any low-pass they fade within units of time."""
+    table = exactly(drive(18.0, noise=0.0, imu=True, speed=lambda t: 0.5 * np.clip(t - 10, 0, 1)))
+    at = {units: int(np.searchsorted(table.time, 11.0 + units * UNIT)) for units in (0, 1, 2)}
+    assert table["warning_command"][at[0]] == pytest.approx(-2 * LIMITS["most"])
+    for units in (1, 2):
+        most = (
+            2 * LIMITS["most"] * np.exp(0.4 - units)
+        )  # the signal itself is a mean over a tenth of the unit
+        assert 0 < -table["warning_command"][at[units]] < most
+
+
 def balance(table: Estimates, row: int) -> Any:
     """Of the leading wheels' adhesion against the trailing ones', and its SD by finite differences."""
     front, rear = (0.5 * (table[f"adhesion_{a}l"][row] + table[f"adhesion_{a}r"][row]) for a in "fr")
