@@ -69,6 +69,17 @@ static tg_real slope_spread(const tg_estimator *e)
     return e->pitch.count == 0 ? 0 : found < given ? found : given;
 }
 
+/* More slope, by which cos(slope) moves by its square only. Where no accelerometer reads it, it also moves load off the front, unseen. */
+static void add_slope(const tg_estimator *e, tg_real mass, tg_real inverse_mass, const tg_real *mu, tg_deviations *d, int32_t k)
+{
+    const tg_settings *s = &e->settings;
+    const tg_real force = s->machine.gravity * slope_spread(e);
+    const tg_real moment = e->acceleration.seen ? 0 : (tg_real)e->direction * mass * s->center_of_gravity_height * force;
+    tg_real gain[TG_MAX_WHEELS];
+    for (int32_t i = 0; i < s->machine.wheels; i++) gain[i] = -moment * s->load_transfer[s->wheel_axle[i]] * s->wheel_share[i];
+    d->acceleration[k] = add_loads(e, mu, gain, d, k) * inverse_mass - force;
+}
+
 /* Work out e->deviations, a column for each constant that has a spread; returns how many, which the settings alone decide. `u` are the inputs
  * along the travel, `mu` adhesion and rho_s. What a constant does not touch stays 0 from the start. */
 int32_t tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
@@ -96,7 +107,7 @@ int32_t tgi_deviations(tg_estimator *e, const tg_input *u, const tg_real *mu)
         d->acceleration[k] = d->accelerometer[k] = -tgi_sqrt(variance) * inverse_mass;
         k++;
     }
-    if (spread->slope > 0) d->acceleration[k++] = -s->machine.gravity * slope_spread(e); /* cos(slope) moves by its square only */
+    if (spread->slope > 0) add_slope(e, mass, inverse_mass, mu, d, k++);
     if (spread->tire_rolling_resistance > 0) {
         for (int32_t i = 0; i < n; i++)
             d->wheel_acceleration[i][k] = -s->machine.radius[i] * spread->tire_rolling_resistance * u->load[i] * inverse_inertia[i];

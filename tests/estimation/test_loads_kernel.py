@@ -155,6 +155,22 @@ def test_on_hills_without_a_roll_the_side_slope_may_be_as_steep():
     np.testing.assert_allclose(level[0]["adhesion_rl_std"], level[1]["adhesion_rl_std"], rtol=1e-9)
 
 
+def test_a_slope_that_nothing_measures_moves_load_off_the_front():
+    """By as much as it weighs on the lever of the centre of gravity; an accelerometer reads it, and loads follow that."""
+    slope = 0.03
+    off = {"center_of_gravity_height": 0.30, "hitch_height": 0.25}
+    level, tilted = (axle_loads((54.0, 85.0), (0.638, 0.0), **off, slope=k) for k in (0.0, slope))
+    for more in ({}, {"acceleration_x": 0.0}):
+        sure, blind = (
+            estimate(steady(roll=0.0, **more), robot(uncertainty={"slope": sd}), held={})
+            for sd in (0.0, slope)
+        )
+        for k, wheel in enumerate(("fl", "rl")):
+            added = blind[f"adhesion_{wheel}_std"][-1] ** 2 - sure[f"adhesion_{wheel}_std"][-1] ** 2
+            share = 0.0 if more else abs(tilted[k] / level[k] - 1) * (sure[f"adhesion_{wheel}"][-1] + 0.02)
+            assert np.sqrt(max(added, 0.0)) == pytest.approx(share, rel=0.1, abs=1e-3)
+
+
 def test_a_torque_that_two_wheels_share_is_theirs_but_for_the_differential():
     """Each wheel's adhesion is less sure, and what both do together is not."""
     noise = np.random.default_rng(3).normal(0, 0.2, (1200, 2))
