@@ -90,6 +90,7 @@ typedef struct { /* a wheel's own time, see wheels.c */
     double until;  /* the time up to which the model has moved its speed, */
     double torque; /* and from which it has done so by the last torque */
     tg_real step;  /* s, of this row: what `until` moved by */
+    tg_real hub;   /* m/s, its speed at `until` */
 } tgi_own_time;
 
 #define TG_SPEED_STATES (TG_MAX_WHEELS + 2)

@@ -39,7 +39,7 @@ static const tgi_field hold[] = {REALS(T, value), REALS(T, variance), REALS(T, r
                                  REALS(T, level), REALS(T, rate), REALS(T, bend), REALS(T, bends), REALS(T, interval), REALS(T, spike), DOUBLES(T, time), DOUBLES(T, since),
                                  INTEGERS(T, count, 0, 100), END};
 #undef T
-static const tgi_field own_time[] = {DOUBLES(tgi_own_time, until), DOUBLES(tgi_own_time, torque), REALS(tgi_own_time, step), END};
+static const tgi_field own_time[] = {DOUBLES(tgi_own_time, until), DOUBLES(tgi_own_time, torque), REALS(tgi_own_time, step), REALS(tgi_own_time, hub), END};
 static const tgi_field lowpass[] = {REALS(tg_lowpass, value), DOUBLES(tg_lowpass, time), FLAG(tg_lowpass, seen), END};
 static const tgi_field settling[] = {REALS(tgi_settling, settled), REALS(tgi_settling, soon), DOUBLES(tgi_settling, time), FLAG(tgi_settling, seen), END};
 

@@ -6,12 +6,19 @@
 
 #define TG_FASTER ((tg_real)1.5) /* times as often as the wheel's speed is its torque measured: not by chance */
 
-/* What the speed moves by, mean square, in the time since its last sample; in a first start, what a vehicle is capable of. */
+/* Speed of a wheel's hub along the travel, as last believed. */
+static tg_real hub(const tg_estimator *e, int32_t i)
+{
+    return e->belief.x[e->settings.machine.wheels + 1] - (tg_real)e->direction * e->settings.wheel_side[i] * e->yaw_rate;
+}
+
+/* What the speed moves by, mean square, in the time since its last sample: by chance, and with its hub; in a first start, what a vehicle
+ * is capable of. */
 static tg_real moved_since(const tg_estimator *e, int32_t i, tg_real age)
 {
     const tg_hold *const h = &e->wheel[i];
     if (h->count < 2) return tgi_square(e->constants.agility[TG_WHEEL_SPEED + i] * age);
-    return tgi_motion(h, e->settings.noise[TG_WHEEL_SPEED + i]) * age / h->interval;
+    return tgi_motion(h, e->settings.noise[TG_WHEEL_SPEED + i]) * age / h->interval + tgi_square((hub(e, i) - e->own_time[i].hub) / e->settings.rolling_radius[i]);
 }
 
 /* Give the row the wheel's speed as it was. All rows until the next sample share one error, and so count as one measurement together. */
@@ -30,6 +37,7 @@ void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
         const tg_hold *const h = &e->wheel[i], *const torque = &e->torque[i];
         tgi_own_time *const p = &e->own_time[i];
         const tg_real age = (tg_real)(row->time - h->time);
+        if (p->until == e->time) p->hub = hub(e, i);
         const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
         const int32_t between = goes && missing && h->interval > 0;
         const int32_t steady = between && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
