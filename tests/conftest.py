@@ -150,10 +150,11 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
             for pipe in wait(list(running)):
                 try:
                     what, content = pipe.recv()
-                except EOFError:
-                    running.pop(pipe).join()
-                    if begun.get(pipe):
-                        session.shouldfail = f"a worker died in {begun[pipe]}"
+                except (EOFError, ConnectionResetError):
+                    process, place = running.pop(pipe), begun.get(pipe, "its start")
+                    process.join()
+                    if place or process.exitcode:
+                        session.shouldfail = f"a worker died in {place or 'its end'}"
                     continue
                 if what == "report":
                     report = hook.pytest_report_from_serializable(config=config, data=content)
@@ -165,7 +166,9 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     finally:
         for process in running.values():
             os.kill(process.pid, signal.SIGINT)
-            process.join()
+        for process in running.values():
+            process.join(20)
+            process.kill()  # a test that catches Ctrl-C goes on, and then waits for a file that nobody gives it
     if session.shouldfail:
         raise session.Failed(session.shouldfail)
     return True
