@@ -12,6 +12,7 @@ import pytest
 
 from terragrip.errors import InputError
 from terragrip.formats import Profile, read
+from terragrip.formats.derivation import unrolled
 from terragrip.formats.table import LogTable
 from terragrip.recording import Recording, sensor_noise
 
@@ -578,6 +579,13 @@ def test_efforts_that_are_nothing_but_0_are_no_torques(foreign: pd.DataFrame, em
     log["/joint_states.effort.front_left"] = np.where(np.arange(len(log)) == 1, 2.0, empty)
     content["channels"]["drive_torque_fl"] = "/joint_states.effort.front_left"
     assert Profile.from_dict(content).apply(log)["drive_torque_fl"][1] == 2.0
+
+
+def test_counts_that_go_by_in_a_gap_are_no_overflow() -> None:
+    """20 s are missing, in which 2700 of 3900 counts went by: they were counted backwards."""
+    time = np.r_[np.arange(0, 20, 0.1), np.arange(40, 60, 0.1)]
+    counts = np.floor(np.interp(time, [0, 20, 40, 60], [0, 500, 3200, 3900]))
+    assert np.array_equal(unrolled(counts, None), counts)
 
 
 def test_efforts_of_which_nothing_states_the_unit_are_named(foreign: pd.DataFrame) -> None:

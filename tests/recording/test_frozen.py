@@ -301,5 +301,14 @@ def test_a_force_that_is_switched_from_end_to_end_does_not_overflow() -> None:
     draws = np.random.default_rng(1002)
     switched = 100.0 * np.sign(np.sin(TIME)) + draws.standard_normal(len(TIME))
     assert overflow_warnings(pulling(drive_torque_l=np.round(switched, 1))) == []
+    # A robot's commands, which had the note: full forward, full back, none; and ramps to a limit, from which it is reversed.
+    commands = np.resize(np.repeat([100.0, -100.0, 0.0], [15, 15, 50]), len(TIME))
+    assert overflow_warnings(pulling(drive_torque_l=commands)) == []
+    ramps = np.concatenate(
+        [np.linspace(0, 1, 8), np.ones(5), -np.ones(5), np.linspace(-1, 0, 8), np.zeros(30)]
+    )
+    for noise in (0.0, 2.0):
+        limited = 100.0 * np.resize(ramps, len(TIME)) + noise * draws.standard_normal(len(TIME))
+        assert overflow_warnings(pulling(drive_torque_l=limited)) == []
     spikes = np.where(draws.random(len(TIME)) < 0.01, -1.0, 1.0) * pulling().channels["drive_torque_l"]
     assert overflow_warnings(pulling(drive_torque_l=spikes)) == []

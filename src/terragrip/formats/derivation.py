@@ -13,6 +13,7 @@ _ROUNDS = 3  # of reweighting, after which outlying positions no longer move
 _WIDEST = 100  # samples to either side of a window
 _FAR = 0.3  # of the longest way in a window: shorter ones show no direction
 _FILLED = 0.9  # of a counter's range: one that overflows has been near both of its ends
+_LEAP = 0.75  # of it: shorter leaps are counts that went by in a gap
 _BLOCK = 20_000  # instants at once, to bound memory
 
 
@@ -35,9 +36,9 @@ def unrolled(angle: Floats, turn: float | None) -> Floats:
         return np.unwrap(angle, period=turn)
     register = 2.0 ** np.ceil(np.log2(span + 1.0))
     steps = np.abs(np.diff(angle))
-    if span < _FILLED * register or not np.any(steps > 0.5 * register) or np.any(angle != np.round(angle)):
+    if span < _FILLED * register or not np.any(steps > _LEAP * register) or np.any(angle != np.round(angle)):
         return angle
-    return np.unwrap(angle, period=register)
+    return np.unwrap(angle, discont=_LEAP * register, period=register)
 
 
 def quotient(time: Floats, dividend: Floats, divisor: Floats, least: float) -> Floats:

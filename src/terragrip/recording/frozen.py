@@ -38,10 +38,8 @@ _SHARE, _LEAST = 0.01, 20  # of the driving, and rows, that a channel is at the 
 _OFTENER = 5.0  # than any other value
 _COMES = 10  # times to this value: a channel held or switched off there comes seldom
 _SLOWEST = 0.15  # s between samples: within more a force may go from end to end
-_WHOLE, _HALF = (
-    0.8,
-    0.5,
-)  # of all that a channel goes through: leaps from end to end, and what no other step is
+# Of all that a channel goes through: leaps from end to end, and what no other step is. Commands of full, none and full back step by half.
+_WHOLE, _PART = 0.8, 0.45
 _EVEN = 0.9  # between the sizes of its ends: those of a signed number are alike
 _SWITCHED = 0.9  # of its end
 _STEADY = 5.0  # usual steps, by which a number that overflows goes on
@@ -275,15 +273,15 @@ def _cut(name: str, time: Floats, values: Floats) -> list[str]:
 def overflow_warnings(recording: Recording) -> list[str]:
     """A sentence on the channels that go on from the greatest to the least value that they have, as a signed number does that overflows."""
     channels = recording.channels.items()
-    found = {
+    overflown = {
         name: seen
         for name, values in channels
         if name.startswith(_RANGED) and (seen := _overflows(recording.time, values))
     }
     return [
-        f"{', '.join(found)} {'leap' if len(found) > 1 else 'leaps'} from one end of the range to the other and back ({seen}): "
+        f"{', '.join(overflown)} {'leap' if len(overflown) > 1 else 'leaps'} from one end of the range to the other and back ({seen}): "
         "a number that overflows. Record it with more bits or another scale, or leave these cells empty."
-        for seen in list(found.values())[:1]
+        for seen in list(overflown.values())[:1]
     ]
 
 
@@ -295,11 +293,16 @@ def _overflows(time: Floats, values: Floats) -> str:
         return ""
     steps = np.abs(np.diff(what))
     leaps = (steps > _WHOLE * (high - low)) & (np.diff(when) <= _SLOWEST)
-    if np.count_nonzero(leaps) < _OFTEN or steps[~leaps].max() > _HALF * (high - low):
+    if np.count_nonzero(leaps) < _OFTEN or steps[~leaps].max() > _PART * (high - low):
         return ""
     if (
         np.count_nonzero(np.abs(what) > _SWITCHED * high) > len(what) / 2
     ):  # one that is switched stays at its ends
+        return ""
+    # One that is limited stays at its end, or leaps one way only: what overflows is beyond one end or the other at most.
+    held = np.count_nonzero((steps == 0.0) & ((what[1:] == low) | (what[1:] == high)))
+    beyond = np.cumsum(np.sign(np.diff(what)[leaps]))
+    if 2 * held > np.count_nonzero(leaps) or np.ptp([0.0, *beyond]) > 2:
         return ""
     # From there it goes on by steps as all others, were it not for the bits that are missing.
     if median(high - low - steps[leaps]) > _STEADY * MAD_TO_SD * median(steps[~leaps]):
