@@ -479,6 +479,8 @@ def test_two_speeds_over_ground_of_other_sizes_are_a_question(size: float) -> No
     columns = {"Radar Speed [m/s]": size * SPEED + noise[0], "GNSS Speed [km/h]": 3.6 * (SPEED + noise[1])}
     speed = _propose(columns)["ground_speed"]
     assert ("which of them has the right scale" in speed.doubt) is (size != 1.0)
+    columns["Ground Speed From Wheels [m/s]"] = columns.pop("Radar Speed [m/s]")  # of which it is slip
+    assert "right scale" not in _propose(columns)["ground_speed"].doubt
 
 
 @pytest.mark.parametrize(

@@ -79,10 +79,12 @@ class Agreement:
             other = guess.column
             if guess is best or guess.unit is None or not other.name.has("ground") or guess.doubt:
                 continue
+            if other.name.has("wheel") or best.column.name.has("wheel"):  # they differ by slip
+                continue
             size, alike = self._evidence.ratio(best.column.column, other.column) or (1.0, 0.0)
             share = size * factor_to(best.unit, "m/s") / factor_to(guess.unit, "m/s")
             if alike > _TOGETHER and _OTHER_SCALE < abs(share - 1) < _OTHER_UNIT:
-                doubt = f"is {share:.3g} times {other.column}: which of them has the right scale (a radar's angle)?"
+                doubt = f"is {share:.3g} times {other.column}: which of them has the right scale (a radar's angle), or is one the wheels'?"
                 place = next(i for i, g in enumerate(ranked["ground_speed"]) if g is best)
                 ranked["ground_speed"][place] = replace(best, doubt=doubt)
                 return
