@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import multiprocessing
 import os
-import signal
-from collections import deque
 from collections.abc import Callable, Generator
 from functools import cache
-from itertools import groupby
-from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
@@ -120,94 +115,3 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
     finally:
         if not loop.is_closed():
             asyncio._set_running_loop(loop)
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--forks", type=int, default=0, metavar="N", help="N workers, forked when all is collected"
-    )
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    """With ``--forks`` each worker takes file after file. Each of xdist's would import every test file anew: 13 s of the processor."""
-    count = session.config.getoption("--forks")
-    if not count or session.testsfailed or session.config.option.collectonly:
-        return None
-    files = [list(items) for _, items in groupby(session.items, key=lambda item: item.path)]
-    waiting, running = deque(range(len(files))), {}
-    begun: dict[Connection, str] = {}
-    session.config._tmp_path_factory.getbasetemp()
-    fork = multiprocessing.get_context("fork")
-    for k in range(min(count, len(files))):
-        here, there = fork.Pipe()
-        running[here] = fork.Process(target=_serve, args=(session, files, there, f"worker{k}"))
-        running[here].start()
-        there.close()
-    hook, config = session.config.hook, session.config
-    try:
-        while running and not session.shouldfail:
-            for pipe in wait(list(running)):
-                try:
-                    what, content = pipe.recv()
-                except (EOFError, ConnectionResetError):
-                    process, place = running.pop(pipe), begun.get(pipe, "its start")
-                    process.join()
-                    if place or process.exitcode:
-                        session.shouldfail = f"a worker died in {place or 'its end'}"
-                    continue
-                if what == "report":
-                    report = hook.pytest_report_from_serializable(config=config, data=content)
-                    hook.pytest_runtest_logreport(report=report)
-                elif what == "next":
-                    pipe.send(waiting.popleft() if waiting else None)
-                else:
-                    begun[pipe] = content
-    finally:
-        for process in running.values():
-            os.kill(process.pid, signal.SIGINT)
-        for process in running.values():
-            process.join(20)
-            process.kill()  # a test that catches Ctrl-C goes on, and then waits for a file that nobody gives it
-    if session.shouldfail:
-        raise session.Failed(session.shouldfail)
-    return True
-
-
-def _serve(session: pytest.Session, files: list[list[pytest.Item]], pipe: Connection, name: str) -> None:
-    """A worker: run files, ask for the next when the last test of one begins, hand back every report."""
-    config = session.config
-
-    class Relay:
-        def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-            data = config.hook.pytest_report_to_serializable(config=config, report=report)
-            pipe.send(("report", data))
-
-    def following() -> list[pytest.Item]:
-        pipe.send(("next", None))
-        number = pipe.recv()
-        return [] if number is None else files[number]
-
-    # A background job ignores it, and the others end by it.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    config.pluginmanager.unregister(name="terminalreporter")
-    config.pluginmanager.register(Relay())
-    config._tmp_path_factory._basetemp = config._tmp_path_factory.mktemp(name, numbered=False)
-    capture = config.pluginmanager.getplugin("capturemanager")  # its files are those of all workers
-    capture.stop_global_capturing()
-    capture.start_global_capturing()
-    capture.suspend_global_capture()
-    items = following()
-    try:
-        while items:
-            after: list[pytest.Item] = []
-            for item, other in zip(items, [*items[1:], None], strict=True):
-                if other is None:
-                    after = following()
-                    other = after[0] if after else None
-                pipe.send(("test", item.nodeid))
-                config.hook.pytest_runtest_protocol(item=item, nextitem=other)
-            items = after
-        pipe.send(("test", ""))
-    finally:
-        session._setupstate.teardown_exact(None)
