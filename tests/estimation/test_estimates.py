@@ -11,7 +11,7 @@ import pytest
 
 from drives import WHEELS, drive, robot
 from terragrip.errors import InputError
-from terragrip.estimation import Estimates, estimate, estimated
+from terragrip.estimation import Estimates, RunOptions, estimate, estimated
 from terragrip.estimation.export import KINDS
 from terragrip.estimation.writing import write_parts
 from terragrip.formats import Profile
@@ -222,3 +222,14 @@ def test_what_is_no_path_is_named(reader: Callable[[object], object]) -> None:
     for wrong in ({"mass": 1.0}, None):
         with pytest.raises(InputError, match=rf"{type(wrong).__name__} is no path; give the path of a"):
             reader(wrong)
+
+
+def test_unchecked_a_log_is_estimated_alike_without_notes_on_its_faults() -> None:
+    log = drive(20.0, rate=20.0).recording
+    in_km_h = Recording(log.time, {**log.channels, "ground_speed": 3.6 * log["ground_speed"]})
+    (checked,), (bare,) = (
+        list(estimated(LogBlocks.of(in_km_h), robot(), RunOptions(checked=each))) for each in (True, False)
+    )
+    assert any("ground_speed" in note for note in checked.notes)
+    assert bare.notes == ()
+    np.testing.assert_array_equal(bare["adhesion_rr"], checked["adhesion_rr"])
