@@ -18,7 +18,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.mechanics import Means
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled, straight_rows
+from terragrip.recording.turns import filled_channel, straight_rows
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def free_axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     axles, ground = vehicle.axles, recording.channels.get("ground_speed")
     if ground is None or not np.isfinite(ground).any():
         return []
-    speed = np.abs(filled(recording.time, ground))
+    speed = np.abs(filled_channel(recording, "ground_speed"))
     rows = straight_rows(recording, vehicle) & (speed > _MOVING * quantile(speed, 0.95))
     rolled = {name: _rolled(recording, axle, speed, rows) for name, axle in axles.items()}
     known = {name: turn for name, turn in rolled.items() if turn is not None}
@@ -178,9 +178,9 @@ def free_axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 def _rolled(recording: Recording, axle: Axle, speed: Floats, rows: Bools) -> Floats | None:
     """An axle's rate of turn over the ground speed [1/m]: quartiles (3,) of ``rows`` (n,); None where one of its wheels is not measured."""
-    own = [recording.channels.get(f"wheel_speed_{wheel}") for wheel in axle.wheels]
-    if not all(values is not None and np.isfinite(values).any() for values in own):
+    names = [f"wheel_speed_{wheel}" for wheel in axle.wheels]
+    if not all(np.isfinite(recording.channels.get(name, np.nan)).any() for name in names):
         return None
-    rate = np.abs(np.mean([filled(recording.time, values) for values in own if values is not None], axis=0))
+    rate = np.abs(np.mean([filled_channel(recording, name) for name in names], axis=0))
     used = rows & (rate > 0)
     return np.quantile(rate[used] / speed[used], [0.25, 0.5, 0.75]) if used.sum() >= _ROWS else None

@@ -36,6 +36,7 @@ _BEYOND = 5.0  # times all others
 _MOST = 0.5  # of a channel: where more is impossible, its unit is wrong
 # 65534: J1939's "error"; -32768: the lowest of two bytes
 _USED = (255.0, 9999.0, 99999.0, 32767.0, 65535.0, 65534.0, -9999.0, -99999.0, -32767.0, -65535.0, -32768.0)
+_SCALED = np.r_[-1.0, np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], _USED)).ravel()]
 _SHORT, _FEWEST = 3, 5  # rows at such a value, and how often
 _LEAP = 5.0  # standard deviations, and steps, of what single samples differ from their neighbours
 _SLOWEST = 0.15  # s between samples: within more a machine may stop and go
@@ -143,8 +144,8 @@ def _mostly(leaps: Bools, there: Bools) -> bool:
 
 def _used_in(values: Floats) -> Floats:
     """Those of a channel's values (n,) that loggers use as codes: -1, or one of `_USED` by any decimal scale, in km/h, too."""
-    scaled = np.outer([1.0, 1 / 3.6], np.outer([1.0, 0.1, 0.01, 1e-3, 1e-4], _USED)).ravel()
-    codes, ordered = np.r_[-1.0, scaled], np.sort(values)
-    near = 1e-9 * np.abs(codes)
-    first, last = np.searchsorted(ordered, codes - near), np.searchsorted(ordered, codes + near)
-    return np.unique(np.concatenate([ordered[i:j] for i, j in zip(first, last, strict=True)]))
+    ordered, near = np.sort(values), 1e-9 * np.abs(_SCALED)
+    first, last = np.searchsorted(ordered, [_SCALED - near, _SCALED + near])
+    return np.unique(
+        np.concatenate([ordered[i:j] for i, j in zip(first, last, strict=True) if j > i] or [ordered[:0]])
+    )

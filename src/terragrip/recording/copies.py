@@ -16,7 +16,7 @@ from terragrip.recording.lag import is_copy
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import quantile
 from terragrip.recording.stretches import DRIVING, is_one_value
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 from terragrip.written_times import span
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ def _turns(recording: Recording, vehicle: Vehicle) -> bool:
     yaw, ground = (recording.channels.get(name) for name in ("angular_velocity_z", "ground_speed"))
     if yaw is None or ground is None:
         return False
-    apart = np.abs(filled(recording.time, yaw)) * (vehicle.track or 0.0)
-    pace = np.abs(filled(recording.time, ground))
+    apart = np.abs(filled_channel(recording, "angular_velocity_z")) * (vehicle.track or 0.0)
+    pace = np.abs(filled_channel(recording, "ground_speed"))
     usual = quantile(pace, 0.95)
     return bool(np.sum((pace > DRIVING * usual) & (apart > _APART * pace)) > _FEW)
 

@@ -17,7 +17,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.brake import braked
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import quantile
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
@@ -89,7 +89,7 @@ class Courses:
             return None
 
         def at(name: str, shift: float = 0.0) -> Floats:
-            return np.interp(points + shift, time, filled(time, channels[name]))
+            return np.interp(points + shift, time, filled_channel(recording, name))
 
         def calm(values: Floats) -> Floats:
             return smooth(values, _CALM, step)

@@ -16,7 +16,7 @@ from terragrip.recording.noise import MAD_TO_SD, white_noise
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import DRIVING, LONG, gaps, is_one_value, longest, may_last
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 from terragrip.written_times import moment, span
 
 if TYPE_CHECKING:
@@ -73,11 +73,12 @@ def frozen_warnings(recording: Recording) -> list[str]:
         notes += _repeats(name, recording.time, force, beside, forces=True)
     for name in ("acceleration_x", "acceleration_y", "angular_velocity_z", "pitch"):
         values = recording.channels.get(name)
-        # only the first follows from the speeds' changes: the others need noise of their own
         if values is None or not np.isfinite(values).any():
             continue
-        if name == "acceleration_x" or _is_restless(recording.time, values):
-            notes += _repeats(name, recording.time, values, _metric(speeds))
+        found = _repeats(name, recording.time, values, _metric(speeds))
+        # only the first follows from the speeds' changes: the others need noise of their own
+        if found and (name == "acceleration_x" or _is_restless(recording.time, values)):
+            notes += found
     return notes + _together(recording, speeds)
 
 
@@ -127,10 +128,12 @@ def _kept(recording: Recording, channels: dict[str, Floats]) -> tuple[float, flo
     time, ground = recording.time, channels["ground_speed"]
     if not may_last(*known_part(time, ground)):
         return None
-    same = np.abs(filled(time, ground)[1:]) > DRIVING * quantile(np.abs(ground[np.isfinite(ground)]), 0.95)
+    same = np.abs(filled_channel(recording, "ground_speed")[1:]) > DRIVING * quantile(
+        np.abs(ground[np.isfinite(ground)]), 0.95
+    )
     usual = 0.0
-    for values in channels.values():
-        whole = filled(time, values)
+    for name in channels:
+        whole = filled_channel(recording, name)
         alike = whole[1:] == whole[:-1]
         same &= alike
         if not same.any():
@@ -235,7 +238,7 @@ def cut_warnings(recording: Recording) -> list[str]:
     ground = recording.channels.get("ground_speed")
     if ground is None or is_one_value(ground):
         return []
-    speed = np.abs(filled(recording.time, ground))
+    speed = np.abs(filled_channel(recording, "ground_speed"))
     driving = speed > DRIVING * quantile(speed, 0.95)
     return [
         note

@@ -243,8 +243,8 @@ def is_copy(turning: npt.NDArray[Any], ground: npt.NDArray[Any]) -> bool:
         known = np.isfinite(wheel)
         wheel, speed = wheel[known], speed[known]
         moves = bool(np.any(speed))
-        scale = float(np.sum(wheel * speed) / np.sum(speed**2)) if moves else 0.0
-        if not (np.isfinite(speed).all() and np.allclose(wheel, scale * speed, rtol=1e-6, atol=1e-9)):
+        own = speed * (np.sum(wheel * speed) / np.sum(speed**2) if moves else 0.0)
+        if not (np.isfinite(speed).all() and (np.abs(wheel - own) <= 1e-9 + 1e-6 * np.abs(own)).all()):
             return False
     return moves
 

@@ -20,7 +20,7 @@ from terragrip.recording.pulls import PULL
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import unit_of
 from terragrip.recording.stretches import DRIVING, LONG, gaps
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled, filled_channel
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.written_times import moment
 
@@ -88,7 +88,7 @@ def _slip(recording: Recording, drive: _Drive, radii: dict[str, float]) -> Float
         name in recording.channels and np.isfinite(recording.channels[name]).sum() > 1 for name in names
     ):
         return np.zeros(len(recording))
-    rims = [filled(drive.time, recording.channels[n]) * r for n, r in zip(names, radii.values(), strict=True)]
+    rims = [filled_channel(recording, n) * r for n, r in zip(names, radii.values(), strict=True)]
     rim = np.mean(rims, axis=0)
     faster = np.where(np.abs(rim) < np.abs(drive.speed), drive.speed, rim)
     return np.asarray(1.0 - drive.speed / np.where(faster == 0.0, 1.0, faster) * (faster != 0.0), np.float64)
@@ -100,7 +100,7 @@ def _drive_of(recording: Recording) -> _Drive | None:
         return None
     if time[-1] - time[0] < 2 * LONG or median(np.diff(time)) > _SLOWEST:
         return None
-    speed = filled(time, ground)
+    speed = filled_channel(recording, "ground_speed")
     middle = (time[1:] + time[:-1]) / 2
     least = DRIVING * quantile(np.abs(speed), 0.95)
     stops = np.r_[
@@ -125,13 +125,16 @@ def _unanswered(
     """Sentences on the leaps of ``parts`` (n,) [m/s²] of the balance that it is left with; ``axles``: the torques of each."""
     if any(np.isfinite(part).sum() < 2 for part in (*parts.values(), climb)):
         return []
+    leaps = {name: _leaps(drive, part) for name, part in parts.items()}
+    most = np.sum(np.abs(list(leaps.values())), axis=0)
+    if not (most[drive.inside] > min(_LEAST, PULL) * STANDARD_GRAVITY).any():  # of most logs
+        return []
     force = np.sum([filled(drive.time, part) for part in parts.values()], axis=0) - filled(drive.time, climb)
     left = drive.unmoved(force)
     spread = MAD_TO_SD * median(np.abs(left[drive.inside]))
     least = min(
         max(_LEAST * STANDARD_GRAVITY, _BEYOND * spread), max(PULL * STANDARD_GRAVITY, 2 * _BEYOND * spread)
     )
-    leaps = {name: _leaps(drive, part) for name, part in parts.items()}
     for name, others in ((name, [o for o in axle if o != name]) for axle in axles for name in axle):
         alone = (leaps[name] != 0) & ~np.any([leaps[other] for other in others], axis=0)
         if others and alone.any():  # one that the axle's other wheel follows is the ground's
@@ -183,7 +186,7 @@ def _leaps(drive: _Drive, part: Floats) -> Floats:
 
 def _sentence(recording: Recording, drive: _Drive, names: tuple[str, ...], instants: list[int]) -> str:
     k, times = instants[0], len(instants) - 1
-    values = [filled(drive.time, recording.channels[name]) for name in names]
+    values = [filled_channel(recording, name) for name in names]
     to = ", ".join(f"from {value[k]:.3g} to {value[k + 1]:.3g}" for value in values)
     leap, stay, their = ("leap", "stay", "their") if len(names) > 1 else ("leaps", "stays", "its")
     return (

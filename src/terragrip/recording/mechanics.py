@@ -34,6 +34,7 @@ _WINDOW = 1.0  # s, at least, and two samples of the ground speed
 _MOVING = 0.15  # of the speed that a twentieth of the windows exceed
 _LEAST = 25  # windows
 _BLOCKS = 10  # of correlated windows, for the jackknife
+_SPREAD = 1e-9  # of x's: what is left without one block, less is rounding
 _SURE = 3.0  # standard errors
 _ALIKE = 0.7  # correlation from which two signals are proportional
 _CLEAR = 0.85  # and from which another reading of the channels is the right one
@@ -86,6 +87,7 @@ class Means:
     climb: Floats | None = None
     length: float = _WINDOW
     thrusts: dict[str, Floats] = field(default_factory=dict)
+    made: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
 
     @property
     def count(self) -> int:
@@ -102,9 +104,15 @@ class Means:
         """All thrust less the drawbar force, over the mass (n,) [m/s²]."""
         return np.asarray(np.sum(list(self.thrusts.values()), axis=0))
 
+    def plain(self, values: Floats) -> Floats:
+        """A channel (rows,) as means over all windows, made once of each."""
+        if id(values) not in self.made:  # with the channel, so that its id stays its own
+            self.made[id(values)] = values, window_means(values, self.place, self.count)
+        return self.made[id(values)][1]
+
     def of(self, values: Floats) -> Floats:
         """A channel (rows,) as means over the stretch of ``change`` (n,)."""
-        plain = window_means(values, self.place, self.count)
+        plain = self.plain(values)
         inner = (plain[:-2] + 2 * plain[1:-1] + plain[2:]) / 4
         return np.r_[np.nan, inner, np.nan][self.rows]
 
@@ -126,12 +134,16 @@ class Means:
             return Fit()
         pair = np.column_stack([y, x])[known]
         common = np.column_stack([np.ones(len(pair)), *(() if other is None else (other[known],))])
-        pair = pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]
-        block = np.arange(len(pair)) * _BLOCKS // len(pair)
-        whole = _ratio(pair)
-        without = np.array([_ratio(pair[block != k]) for k in range(_BLOCKS)])
-        error = float(np.sqrt((_BLOCKS - 1) * np.var(without)))
-        return Fit(whole, error, float(np.corrcoef(pair.T)[0, 1])) if np.isfinite(whole + error) else Fit()
+        y, x = (pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]).T
+        starts = np.searchsorted(np.arange(len(y)) * _BLOCKS // len(y), np.arange(_BLOCKS))
+        sums = np.add.reduceat([np.ones(len(y)), x, y, x * x, x * y], starts, axis=1)
+        count, of_x, of_y, xx, xy = sums.sum(axis=1)[:, None] - np.c_[np.zeros(len(sums)), sums]
+        spread = xx - of_x**2 / count
+        if not (spread > _SPREAD * spread[0]).all():
+            return Fit()
+        slopes = (xy - of_x * of_y / count) / spread
+        error = float(np.sqrt((_BLOCKS - 1) * np.var(slopes[1:])))
+        return Fit(float(slopes[0]), error, float(np.corrcoef(y, x)[0, 1]))
 
 
 def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means | None) -> list[str]:
@@ -180,13 +192,6 @@ def shortfall_warnings(recording: Recording, means: Means | None) -> list[str]:
         "the weight too little to move the vehicle, even without resistance: the zero of drawbar_force drifts, or the scale of one of them "
         "changed. Correct these cells, or leave them empty."
     ]
-
-
-def _ratio(pair: Floats) -> float:
-    """Slope of the first column over the second (n, 2)."""
-    a, b = (pair - pair.mean(axis=0)).T
-    below = float(np.sum(b * b))
-    return float(np.sum(a * b)) / below if below else np.nan
 
 
 def means_of(recording: Recording, vehicle: Vehicle | None = None) -> Means | None:

@@ -13,8 +13,9 @@ from terragrip.recording.held import measured_part
 from terragrip.recording.lag import Lag, lag_within
 from terragrip.recording.noise import white_noise
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.schema import speed_names
 from terragrip.recording.stretches import gaps
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 from terragrip.units import factor_to
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def clock_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     ground, rims = recording.channels.get("ground_speed"), _rims(recording, vehicle)
     if ground is None or not rims or len(recording) < 2 * _LAGS[-1]:
         return []
-    time, speed = recording.time, filled(recording.time, ground)
+    time, speed = recording.time, filled_channel(recording, "ground_speed")
     changes = _changes(time, speed, rims)
     if changes > GRIP:
         fastest = quantile(np.abs(speed[np.isfinite(speed)]), _OFTEN)
@@ -87,7 +88,7 @@ def drift_warnings(recording: Recording) -> list[str]:
     def lag_of(part: int) -> Lag | None:
         edges = time[0] + part * third + np.array([0.0, min(third, _PART)])
         rows = slice(*np.searchsorted(time, edges))
-        return lag_within(time[rows], {name: values[rows] for name, values in channels.items()})
+        return lag_within(time[rows], {name: channels[name][rows] for name in speed_names(channels)})
 
     def is_grown(*lags: Lag) -> bool:
         return abs(grown) >= max(_DRIFT, _CERTAIN * error + max(lag.explained[1] for lag in lags))
@@ -136,8 +137,9 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 def _rims(recording: Recording, vehicle: Vehicle) -> list[tuple[float, Floats]]:
     """Radius and speed (n,) [rad/s] of the wheels that have one."""
     named = [(radius, f"wheel_speed_{wheel}") for wheel, radius in vehicle.radii.items()]
-    known = [(radius, recording.channels[name]) for radius, name in named if name in recording.channels]
-    filled_up = [(radius, filled(recording.time, values)) for radius, values in known]
+    filled_up = [
+        (radius, filled_channel(recording, name)) for radius, name in named if name in recording.channels
+    ]
     return [(radius, values) for radius, values in filled_up if np.isfinite(values[:1]).all()]
 
 

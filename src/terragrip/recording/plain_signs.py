@@ -16,7 +16,7 @@ from terragrip.recording.mechanics import means_of
 from terragrip.recording.ranks import quantile
 from terragrip.recording.sides import are_opposed, one_pulls, opposed_note
 from terragrip.recording.turn_rates import opposite_turn
-from terragrip.recording.turns import SURE, agreement, filled, windows
+from terragrip.recording.turns import SURE, agreement, filled, filled_channel, windows
 from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
@@ -99,6 +99,6 @@ def _yaw(recording: Recording, pairs: list[tuple[str, str]]) -> list[str]:
     yaw = recording.channels.get("angular_velocity_z")
     if yaw is None or not pairs:
         return []
-    speeds = [[filled(recording.time, recording.channels[f"wheel_speed_{w}"]) for w in p] for p in pairs]
+    speeds = [[filled_channel(recording, f"wheel_speed_{w}") for w in p] for p in pairs]
     turn = np.mean([right - left for left, right in speeds], axis=0)
     return [opposite_turn(["the wheels' speeds"])] if agreement(recording.time, yaw, turn) < -SURE else []

@@ -15,7 +15,7 @@ from terragrip.recording.ranks import median, quantile
 from terragrip.recording.sides import Axle, Drive
 from terragrip.recording.stretches import DRIVING, instant_of, step_of
 from terragrip.recording.track import Track
-from terragrip.recording.turns import WINDOW, filled
+from terragrip.recording.turns import WINDOW, filled_channel
 from terragrip.written_times import moment
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _of_axle(
         return []
     at, size = step
     names = [f"{quantity}_{wheel}" for wheel in axle.wheels]
-    raw = [filled(recording.time, recording.channels[name]) for name in names]
+    raw = [filled_channel(recording, name) for name in names]
     driving = np.logical_and.reduce([one > DRIVING * quantile(np.abs(one), 0.95) for one in raw])
     ratio = np.full(len(recording), np.nan)
     ratio[driving] = np.log(raw[0][driving] / raw[1][driving])
@@ -130,7 +130,7 @@ def _ground(recording: Recording, track: Track | None) -> list[str]:
     ground = recording.channels.get("ground_speed")
     if track is None or ground is None or np.isfinite(ground).sum() < 2:
         return []
-    own = np.abs(np.interp(track.time, recording.time, filled(recording.time, ground)))
+    own = np.abs(np.interp(track.time, recording.time, filled_channel(recording, "ground_speed")))
     rows = ~track.gap & (np.minimum(own, track.speed) > DRIVING * quantile(own, 0.95))
     when, place = track.time[rows], np.floor((track.time[rows] - recording.time[0]) / WINDOW)
     starts = np.flatnonzero(np.diff(place, prepend=-1.0))

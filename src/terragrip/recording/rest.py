@@ -9,10 +9,11 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats
 from terragrip.physics.loads import GRAVITY
+from terragrip.recording.once import once
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import LONG, gaps
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -138,6 +139,7 @@ def _known(values: Floats) -> Floats:
     return values[np.isfinite(values)]
 
 
+@once
 def _stops(recording: Recording) -> tuple[list[slice], Bools]:
     """The rows of each long stop of all wheels, without those in which they stop and start, and whether they stand (n,)."""
     time, still = recording.time, np.ones(len(recording), dtype=bool)
@@ -145,7 +147,7 @@ def _stops(recording: Recording) -> tuple[list[slice], Bools]:
     if not rims or np.any(np.diff(time) <= 0):
         return [], still
     for name in rims:
-        turning = np.abs(filled(time, recording.channels[name]))
+        turning = np.abs(filled_channel(recording, name))
         usual = quantile(turning, 0.95) if np.isfinite(turning).all() else 0.0
         if not usual > 0:  # dead, or it hardly ever turns: it shows no stop
             return [], still

@@ -14,7 +14,7 @@ from terragrip.arrays import Bools, Floats
 from terragrip.recording.ranks import quantile
 from terragrip.recording.schema import rim_names
 from terragrip.recording.stretches import longest
-from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, side_differences, windows
+from terragrip.recording.turns import LEAST_TURN, WINDOW, filled_channel, side_differences, windows
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.written_times import span
 
@@ -36,12 +36,12 @@ _WRONG = "in reverse turns the slips of both sides are wrong."
 
 def against_warnings(recording: Recording) -> list[str]:
     """A sentence on speeds of wheels, or of the drive train, that are against the ground speed while both are large, mostly."""
-    channels, time = recording.channels, recording.time
+    channels = recording.channels
     speeds = ("ground_speed", *rim_names(channels))
     known = [n for n in speeds if np.isfinite(channels.get(n, np.nan)).sum() >= _FEWEST]
     if known[:1] != ["ground_speed"]:
         return []
-    ground = filled(time, channels["ground_speed"])
+    ground = filled_channel(recording, "ground_speed")
     large, odd = _large(ground), []
     for name in known[1:]:
         rim = channels[name]
@@ -70,8 +70,8 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     ground = channels.get("ground_speed")
     if ground is None or not known or np.isfinite(ground).sum() < _FEWEST:
         return []
-    rims = {w: filled(time, channels[f"wheel_speed_{w}"]) for w in known}
-    rim, speed = np.mean(list(rims.values()), axis=0), filled(time, ground)
+    rims = {w: filled_channel(recording, f"wheel_speed_{w}") for w in known}
+    rim, speed = np.mean(list(rims.values()), axis=0), filled_channel(recording, "ground_speed")
     moving = _large(rim) & _large(speed)
     back = moving & (rim < 0)
     slides = longest(time, moving & (rim > 0) & (speed < 0), np.ones(len(time), dtype=bool))
@@ -82,7 +82,7 @@ def reverse_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         ]
     if not moving.any():
         return []
-    torques = [filled(time, v) for n, v in channels.items() if n.startswith("drive_torque_")]
+    torques = [filled_channel(recording, n) for n in channels if n.startswith("drive_torque_")]
     if torques and np.mean((back & (speed < 0))[moving]) > _ALIKE and np.mean(np.sum(torques, 0)[moving]) > 0:
         return [
             "Wheels and ground speed go backward all the way while the drive torques push forward: nothing drives so. Write 'sign: -1' for "

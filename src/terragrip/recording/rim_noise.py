@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from terragrip.recording.lag import measured
-from terragrip.recording.noise import rounding_noise, sensor_noise
+from terragrip.recording.noise import rounding_noise, white_noise
 from terragrip.recording.ranks import median
 from terragrip.recording.table import Recording
 from terragrip.vehicle import Vehicle
@@ -20,21 +20,20 @@ _PARTS, _ROWS = 4, 2500  # parts of a long log, each of so many rows, in which n
 def noisy_rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence on wheel speeds whose noise [rad/s] is over twice what the vehicle file states, of logs that are not coarser."""
     stated = vehicle.sensors.wheel_speed
-    known = {
-        n: measured(recording.time, v) for n, v in recording.channels.items() if n.startswith("wheel_speed_")
-    }
-    quick = [name for name, own in known.items() if own and median(np.diff(own[0])) <= _SLOWEST]
-    if stated is None or not quick:
+    if stated is None:
         return []
-    rims = {name: recording.channels[name] for name in quick}
+    rims = {name: v for name, v in recording.channels.items() if name.startswith("wheel_speed_")}
     part = replace(recording, channels=rims, labels={})
     if len(part) > _PARTS * _ROWS:
         begins = np.linspace(0, len(part) - _ROWS, _PARTS).astype(np.intp)
         part = part.select((begins[:, None] + np.arange(_ROWS)).ravel())
-    # In a coarse log the steps are the noise, and the estimator adds them by itself.
-    fine = {name: values for name, values in part.channels.items() if rounding_noise(values, stated) < stated}
-    noise = sensor_noise(replace(part, channels=fine))
-    noisy = {name: sd for name, sd in noise.items() if sd > _TWICE * stated}
+    noisy: dict[str, float] = {}
+    for name, values in part.channels.items():
+        own = measured(part.time, values)
+        # In a coarse log the steps are the noise, and the estimator adds them by itself.
+        if own and median(np.diff(own[0])) <= _SLOWEST and rounding_noise(values, stated) < stated:
+            sd = part.noise.get(name) or white_noise(*own) or 0.0
+            noisy |= {name: sd} if sd > _TWICE * stated else {}
     if not noisy:
         return []
     most, (first, *others) = max(noisy.values()), noisy

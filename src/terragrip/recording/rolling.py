@@ -13,10 +13,10 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.copies import one_signal
 from terragrip.recording.noise import white_noise
+from terragrip.recording.once import once
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.stretches import longest
 from terragrip.recording.turns import side_differences, straight_rows
-from terragrip.recording.window_means import window_means
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.written_times import span
 
@@ -63,7 +63,7 @@ def light_warnings(
     if means is None:
         return []
     radii, share = vehicle.driven_radii, vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
-    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+    straight = _straight(recording, vehicle, means)
     off: dict[str, float] = {}
     for axle in vehicle.axles.values():
         ways, pulls = dict[str, Floats](), list[Floats]()
@@ -100,13 +100,20 @@ def light_warnings(
     ]
 
 
+@once
+def _straight(recording: Recording, vehicle: Vehicle, means: Means) -> Bools:
+    """The windows (n,) all of whose rows are straight ahead."""
+    return means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+
+
+@once
 def _rolled(recording: Recording, wheel: str, means: Means) -> Floats | None:
     """How far a wheel rolls a radian [m] in each window (n,)."""
     turning = recording.channels.get(f"wheel_speed_{wheel}")
     if turning is None:
         return None
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.abs(means.speed / window_means(turning, means.place, means.count)[means.rows])
+        return np.abs(means.speed / means.plain(turning)[means.rows])
 
 
 def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
@@ -118,7 +125,7 @@ def _against_the_pull(recording: Recording, vehicle: Vehicle, means: Means) -> l
         return []
     slip = 1 - np.mean([way / radii[w] for w, way in known.items()], axis=0)
     thrust = np.sum([means.of(channels[f"drive_torque_{w}"]) / r for w, r in radii.items()], axis=0)
-    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+    straight = _straight(recording, vehicle, means)
     rows = np.isfinite(slip) & straight & (thrust > _PULLING * vehicle.mass * STANDARD_GRAVITY)
     if rows.sum() < _LEAST or quantile(slip[rows], _MOST) >= -_RADII:
         return []
@@ -139,7 +146,7 @@ def slower_warnings(
     if means is None:
         return []
     when = means.middles
-    straight = means.of(straight_rows(recording, vehicle).astype(np.float64)) == 1.0
+    straight = _straight(recording, vehicle, means)
     sides = dict(zip(vehicle.wheels, vehicle.wheel_side, strict=True))
     if turn is None:
         usable, slowed = straight, dict.fromkeys(sides, np.min(_inner(recording, vehicle, means), axis=0))
@@ -154,13 +161,12 @@ def slower_warnings(
     slower = _SLOWER if stated is None else min(_SLOWER, max(_RADII_SURE * stated, _SLOWER_LEAST))
     ground = recording.channels["ground_speed"]
     measured = np.isfinite(ground)
-    noise = vehicle.sensors.ground_speed or white_noise(recording.time[measured], ground[measured]) or 0.0
     found: dict[str, tuple[float, float]] = {}
     wheels: dict[str, Floats] = {}
     for wheel, radius in vehicle.driven_radii.items():
         spin, torque = (recording.channels.get(f"{name}_{wheel}") for name in ("wheel_speed", "drive_torque"))
         if spin is not None and torque is not None:
-            rim = radius * window_means(spin, means.place, means.count)[means.rows]
+            rim = radius * means.plain(spin)[means.rows]
             wheels[wheel] = np.array([rim, means.speed - slowed[wheel], means.of(torque) / radius])
     # How wheels share one torque was not measured: behind a lock the outer one brakes in a turn.
     groups = one_signal(recording, [f"drive_torque_{wheel}" for wheel in wheels])
@@ -176,6 +182,7 @@ def slower_warnings(
         samples = measured & (
             np.abs(recording.time - np.mean(stretch)) <= (np.ptp(stretch) + means.length) / 2
         )
+        noise = vehicle.sensors.ground_speed or white_noise(recording.time[measured], ground[measured]) or 0.0
         if np.mean((hub - rim - slower * hub)[within]) > _SURE * noise / np.sqrt(samples.sum()):
             found[wheel] = stretch
     if not found:
@@ -204,7 +211,7 @@ def _inner(recording: Recording, vehicle: Vehicle, means: Means) -> Floats:
     """By how much [m/s] the inner hubs of each axle may be slower than the vehicle in each window (axles, n): half of what the rims of left
     and right differ by. A turn shows on every axle, so where no joint bends the least counts."""
     rims = {
-        wheel: radius * window_means(recording.channels[name], means.place, means.count)[means.rows]
+        wheel: radius * means.plain(recording.channels[name])[means.rows]
         for wheel, radius in vehicle.radii.items()
         if (name := f"wheel_speed_{wheel}") in recording.channels
     }

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.once import once
 from terragrip.recording.ranks import quantile
-from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, windows
+from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, filled_channel, windows
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
@@ -144,6 +145,7 @@ class Drive:
         return hard > _TURNING * axle.load / 2 and float(np.mean(slip * pull)) < -_OPPOSED * size
 
 
+@once
 def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[Axle], Floats, Floats]:
     """Axles of two sides with both speeds known, time, and the turn, as means over the windows that have them all."""
     radius, channels = vehicle.radii, recording.channels
@@ -157,12 +159,8 @@ def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[A
             continue
         powered = all(np.isfinite(channels.get(f"drive_torque_{w}", np.nan)).any() for w in sides)
         found.append((name, sides, axle.mass * STANDARD_GRAVITY, len(rows), powered))
-        rows += [radius[w] * filled(recording.time, channels[f"wheel_speed_{w}"]) for w in sides]
-        rows += (
-            [filled(recording.time, channels[f"drive_torque_{w}"]) / radius[w] for w in sides]
-            if powered
-            else []
-        )
+        rows += [radius[w] * filled_channel(recording, f"wheel_speed_{w}") for w in sides]
+        rows += [filled_channel(recording, f"drive_torque_{w}") / radius[w] for w in sides] if powered else []
     means = windows(recording.time, np.array(rows))
     axles = [
         Axle(name, sides, load, means[at : at + 2], means[at + 2 : at + 4] if powered else None)

@@ -13,7 +13,7 @@ import numpy as np
 
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled_channel
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def slowing_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     points, step = found
 
     def at(name: str) -> Floats:
-        return smooth(np.interp(points, recording.time, filled(recording.time, channels[name])), _CALM, step)
+        return smooth(np.interp(points, recording.time, filled_channel(recording, name)), _CALM, step)
 
     weight, radii = vehicle.mass * STANDARD_GRAVITY, list(vehicle.driven_radii.values())
     speed = at("ground_speed")

@@ -14,7 +14,7 @@ from terragrip.recording.held import known_part
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.rolling import RATIOS
 from terragrip.recording.track import Track
-from terragrip.recording.turns import filled, straight_rows
+from terragrip.recording.turns import filled, filled_channel, straight_rows
 from terragrip.recording.window_means import windows_of
 
 if TYPE_CHECKING:
@@ -219,7 +219,7 @@ def _straight_ahead(recording: Recording, track: Track, least: float = 0.0) -> t
     A turn only shortens a straight line between positions. ``least`` [m]: the shortest distance of a window by ground speed, larger than
     the positions' noise.
     """
-    speed = np.abs(filled(recording.time, recording.channels["ground_speed"]))
+    speed = np.abs(filled_channel(recording, "ground_speed"))
     way = np.r_[0.0, np.cumsum(np.diff(recording.time) * (speed[1:] + speed[:-1]) / 2)]
     length = max(_WAY_WINDOW, least / max(quantile(speed, 0.95), 1e-9))
     edges = windows_of(track.time, length / 2)[1]

@@ -12,7 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import SURE, filled, side_differences, windows
+from terragrip.recording.turns import SURE, filled_channel, side_differences, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -34,7 +34,7 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     states = vehicle.articulated or any(axle.steered for _, axle in every)
     if turn is None or states or not needed <= recording.channels.keys():
         return []
-    ground = filled(recording.time, recording.channels["ground_speed"])
+    ground = filled_channel(recording, "ground_speed")
     rims = [np.mean([_rim(recording, vehicle, w) for w in axle.wheels], axis=0) for _, axle in axles]
     *rims, ground, rate = windows(recording.time, np.array([*rims, ground, turn]))
     if not len(rate):
@@ -91,4 +91,4 @@ def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) 
 
 def _rim(recording: Recording, vehicle: Vehicle, wheel: str) -> Floats:
     """Rim speed (n,) [m/s]."""
-    return vehicle.radii[wheel] * filled(recording.time, recording.channels[f"wheel_speed_{wheel}"])
+    return vehicle.radii[wheel] * filled_channel(recording, f"wheel_speed_{wheel}")

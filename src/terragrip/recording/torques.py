@@ -20,7 +20,7 @@ from terragrip.arrays import Floats, Ints
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled
+from terragrip.recording.turns import filled, filled_channel
 from terragrip.recording.window_means import window_means, windows_of
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
@@ -120,7 +120,7 @@ def _courses(recording: Recording, vehicle: Vehicle) -> tuple[Floats, Floats, fl
         return np.interp(points, time, values)
 
     def known(name: str) -> Floats:
-        return filled(time, channels[name])
+        return filled_channel(recording, name)
 
     thrusts = [known(f"drive_torque_{w}") / radius for w, radius in radii.items()]
     thrust = at(np.sum(thrusts, axis=0)) / vehicle.mass

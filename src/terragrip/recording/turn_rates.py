@@ -8,9 +8,18 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.lag import is_copy
+from terragrip.recording.once import once
 from terragrip.recording.ranks import quantile
 from terragrip.recording.track import Track
-from terragrip.recording.turns import LEAST_TURN, SURE, WINDOW, agreement, filled, side_differences, windows
+from terragrip.recording.turns import (
+    LEAST_TURN,
+    SURE,
+    WINDOW,
+    agreement,
+    filled_channel,
+    side_differences,
+    windows,
+)
 from terragrip.recording.wrong_sign import WrongSign
 
 if TYPE_CHECKING:
@@ -84,8 +93,8 @@ def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
     shown = yaw[np.isfinite(yaw)]
     if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
         return False
-    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
-    rims = [vehicle.radii[w] * np.abs(filled(recording.time, v)) for w, v in speeds.items() if v is not None]
+    known = [w for w in vehicle.wheels if f"wheel_speed_{w}" in recording.channels]
+    rims = [vehicle.radii[w] * np.abs(filled_channel(recording, f"wheel_speed_{w}")) for w in known]
     if not rims:
         return False
     apart, pace = windows(
@@ -113,7 +122,8 @@ def _turn_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None, trac
         others["the wheels' speeds"] = rims
     if track is not None:
         others["the positions"] = track.at("turn", recording.time)
-    pace = filled(recording.time, recording.channels.get("ground_speed", np.full(len(yaw), np.nan)))
+    has_speed = "ground_speed" in recording.channels
+    pace = filled_channel(recording, "ground_speed") if has_speed else np.full(len(yaw), np.nan)
     turned, still = False, []
     for who, turn in others.items():
         known = np.isfinite(yaw) & np.isfinite(turn)
@@ -155,15 +165,16 @@ def _track_scale(recording: Recording, yaw: Floats, vehicle: Vehicle | None) -> 
     )
 
 
+@once
 def _wheel_turn(recording: Recording, vehicle: Vehicle, *, rims: bool = False) -> Floats:
     """Yaw rate (n,) by right less left wheel speeds, up to a factor: the track, where ``rims`` selects rim speeds. An axle that is filled
     in from the ground speed shows no turn (docs/vehicle.md)."""
-    ground = recording.channels.get("ground_speed")
-    speeds = {w: recording.channels.get(f"wheel_speed_{w}") for w in vehicle.wheels}
+    channels, ground = recording.channels, recording.channels.get("ground_speed")
     measured = {
-        wheel: (vehicle.radii[wheel] if rims else 1.0) * filled(recording.time, speed)
-        for wheel, speed in speeds.items()
-        if speed is not None and not (ground is not None and is_copy(speed, ground))
+        wheel: (vehicle.radii[wheel] if rims else 1.0) * filled_channel(recording, name)
+        for wheel in vehicle.wheels
+        if (name := f"wheel_speed_{wheel}") in channels
+        and not (ground is not None and is_copy(channels[name], ground))
     }
     parts = side_differences(vehicle, measured)
     return np.mean(parts, axis=0) if parts else np.full(len(recording), np.nan)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Bools, Floats
+from terragrip.recording.once import once
 from terragrip.recording.ranks import quantile
 
 if TYPE_CHECKING:
@@ -49,6 +50,12 @@ def filled(time: Floats, values: Floats) -> Floats:
     return np.interp(time, time[known], values[known]) if known.any() and not known.all() else values
 
 
+@once
+def filled_channel(recording: Recording, name: str) -> Floats:
+    """The same of one channel of a log (n,)."""
+    return filled(recording.time, recording.channels[name])
+
+
 def side_differences(vehicle: Vehicle, rims: Mapping[str, Floats]) -> list[Floats]:
     """Of each axle whose outer wheels are both among ``rims`` (n,), the right one's less the left one's."""
     outer = [(axle.wheels[0], axle.wheels[-1]) for axle in vehicle.axles.values() if len(axle.wheels) > 1]
@@ -81,6 +88,7 @@ def _correlation(a: Floats, b: Floats) -> float:
     return float(np.sum(a * b)) / size if size else 0.0
 
 
+@once
 def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
     """Rows (n,) in which the rims of each axle have like speeds from side to side, so no turn moves one, nor a steered one, far from the
     ground speed; if there are hardly any, those in which they turn the same way."""
@@ -88,11 +96,8 @@ def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
     ahead = float(np.abs(vehicle.wheel_ahead).max())
     side = dict(zip(vehicle.wheels, vehicle.wheel_side.tolist(), strict=True))
     for axle in vehicle.axles.values():
-        sides = [
-            (recording.channels.get(f"wheel_speed_{w}"), vehicle.radii[w])
-            for w in (axle.wheels[0], axle.wheels[-1])
-        ]
-        rims = [r * filled(recording.time, speed) for speed, r in sides if speed is not None]
+        known = [w for w in (axle.wheels[0], axle.wheels[-1]) if f"wheel_speed_{w}" in recording.channels]
+        rims = [vehicle.radii[w] * filled_channel(recording, f"wheel_speed_{w}") for w in known]
         if len(axle.wheels) > 1 and len(rims) == 2:
             track = abs(side[axle.wheels[0]] - side[axle.wheels[-1]])
             slant = min(_SLANT, _TURNED * track / (2 * ahead)) if ahead * track > 0 else _SLANT
