@@ -1,10 +1,12 @@
 /* Each wheel's own time (docs/decisions/0026-slow-wheel-speeds.md). A wheel's slip settles within milliseconds, so that its
  * speed changes as slowly as the vehicle's, while a torque's noise, or an old torque, integrated between two samples of the speed would make
  * it run away. So the model moves a wheel from sample to sample of its speed, by the torque of the later one; in rows between, it waits.
- * Where torques come faster than the speed, it moves with each of them, too, and its speed is steady: so the adhesion follows the torque. */
+ * Where torques come faster than the speed, it moves with each of them, too, and its speed is steady until its next sample is overdue: so the
+ * adhesion follows the torque. */
 #include "estimator.h"
 
 #define TG_FASTER ((tg_real)1.5) /* times as often as the wheel's speed is its torque measured: not by chance */
+#define TG_OVERDUE ((tg_real)1.5) /* intervals without a sample: its wheel's speed does not count as steady any longer, so it waits */
 
 /* Speed of a wheel's hub along the travel, as last believed. */
 static tg_real hub(const tg_estimator *e, int32_t i)
@@ -40,7 +42,8 @@ void tgi_time_wheels(tg_estimator *e, tg_real dt, int32_t goes, tg_row *row)
         if (p->until == e->time) p->hub = hub(e, i);
         const int32_t missing = isnan(row->value[TG_WHEEL_SPEED + i]);
         const int32_t between = goes && missing && h->interval > 0;
-        const int32_t steady = between && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
+        const int32_t expected = age < TG_OVERDUE * h->interval;
+        const int32_t steady = between && expected && torque->time == row->time && torque->interval > 0 && h->interval > TG_FASTER * torque->interval;
         const int32_t waits = between && !steady;
         e->scene.since_sample[i] = waits ? moved_since(e, i, age) : 0;
         const double from = goes ? p->until : e->time;

@@ -102,15 +102,23 @@ def test_a_wheel_without_a_sample_in_the_first_row_of_motion_waits_for_it() -> N
 
 
 @pytest.mark.parametrize("seed", [8999502, 8999505])
-def test_a_silent_wheel_may_move_as_its_hub_does(seed: int) -> None:
-    """Its SD grew by what its speed changes by chance alone: such slips held in 61 % of rows (8999502)."""
+@pytest.mark.parametrize("every", [1, 5])
+def test_a_silent_wheel_may_move_as_its_hub_does(seed: int, every: int) -> None:
+    """Its SD grew by what its speed changes by chance alone: such slips held in 61 % of rows (8999502).
+
+    Where torques come 5 times as often as speeds, a silent speed counted as steady for as long as it was silent: 53 %.
+    """
     kind = next(k for k, s in families.machines("development", 8, 8999500) if s == seed)
     result = families.draw(kind, seed, rate=50.0)
     recording, wheel = result.recording, result.vehicle.wheels[0]
     silent = (recording.time - recording.time[0]) % 20.0 >= 15.0
-    channels = dict(recording.channels)
-    name = f"wheel_speed_{wheel}"
-    channels[name] = np.where(silent, np.nan, channels[name])
+    between = np.arange(len(recording)) % every != 0
+    channels = {
+        n: np.where(between | (silent & (n == f"wheel_speed_{wheel}")), np.nan, v)
+        if n.startswith("wheel_speed")
+        else v
+        for n, v in recording.channels.items()
+    }
     estimates = tg.estimate(replace(recording, channels=channels), result.vehicle)
     true, slip = result.truth[f"true_slip_{wheel}"].to_numpy(), estimates[f"slip_{wheel}"]
     moves = silent & (np.abs(result.truth["true_ground_speed"].to_numpy()) > 0.1) & np.isfinite(slip)
