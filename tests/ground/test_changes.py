@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from ground_drives import COARSE, FINE, GRASS, VEHICLE, Ground, drive, thinned
 from terragrip.errors import InputError
 from terragrip.ground import changes as changes_module
-from terragrip.ground.analysis import analyse
+from terragrip.ground.analysis import Settings, analyse
 from terragrip.ground.changes import LEAST, _borders, _Cost, changes_of
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
@@ -27,6 +27,7 @@ from terragrip.ground.signals import GROUND, curve_scale, signals_of
 from terragrip.ground.steps import A_LENGTH, joined, steps_of
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.blocks import estimates_blocks
+from terragrip.soil.estimates import whole_length
 from terragrip.vehicle import Vehicle
 
 USUAL = noise_of(np.zeros((0, 4)), GROUND)
@@ -78,6 +79,23 @@ def test_a_change_is_found_where_it_is():
     assert result[0].probability > 0.99
     assert result[0].shift["soil_resistance"] > 2
     assert result[0].shift["adhesion_sd"] > 1
+
+
+@pytest.mark.parametrize("online", [False, True])
+def test_a_border_is_crossed_over_the_vehicles_length(online):
+    """Wheel by wheel, then by the tool: both ends of the crossing lie in the stated interval, as its middle does."""
+    crossing = whole_length(Vehicle.from_dict(VEHICLE)) / 0.6
+    between = [
+        ("", replace(GRASS, a=GRASS.a + k * (COARSE.a - GRASS.a), resistance=0.07 * (1 + k)), crossing / 4)
+        for k in (0.2, 0.4, 0.6, 0.8)
+    ]
+    held = []
+    for seed in range(8):
+        estimates = drive(seed, [("grass", GRASS, 40), *between, ("coarse", COARSE, 40)])
+        changes = analyse(estimates, settings=Settings(online=online))[0].changes
+        for end in (40, 40 + crossing):
+            held.append(any(abs(one.time - end) < 1.96 * one.std for one in changes))
+    assert np.mean(held) > 0.9
 
 
 def test_pull_alone_is_no_change():

@@ -19,7 +19,7 @@ from terragrip.ground.causes import LEVELS, OR_TOOL, Pull, cause_of, signs_of
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
-from terragrip.ground.steps import steps_of
+from terragrip.ground.steps import A_LENGTH, crossing_variance, steps_of
 from terragrip.soil.blocks import Blocks
 
 LENGTH = 30.0
@@ -102,6 +102,7 @@ def changes_of(
             steps,
             dict(zip(names, noise.within, strict=True)),
             (before, border, after),
+            step,
             np.exp(-price / 2),
             cause_of(signs[before:border], signs[border:after], levels, pull),
         )
@@ -181,6 +182,7 @@ def _change(
     steps: Blocks,
     within: Mapping[str, float],
     place: tuple[int, int, int],
+    step: float,
     chance: float,
     cause: str,
 ) -> Change:
@@ -196,7 +198,9 @@ def _change(
     weight /= weight.sum()
     middle, took = 0.5 * (steps.end[at - 1] + steps.start[at]), steps.end[at] - steps.end[at - 1]
     time = float((weight * middle).sum())
-    variance = (weight * ((middle - time) ** 2 + took**2 / 12)).sum()
+    first, last = max(border - A_LENGTH // 2, 0), min(border + A_LENGTH // 2, len(steps) - 1)
+    way, seconds = (float(x[last] - x[first]) for x in (steps.travelled, steps.end))
+    variance = (weight * ((middle - time) ** 2 + took**2 / 12)).sum() + crossing_variance(step, way, seconds)
     shift = {}
     for (name, sd), signal in zip(within.items(), cost.signal.T, strict=True):
         one, other = (part[np.isfinite(part)] for part in (signal[before:border], signal[border:after]))

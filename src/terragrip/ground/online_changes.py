@@ -19,7 +19,7 @@ from terragrip.ground.changes import LENGTH, Change
 from terragrip.ground.conjugate import Model
 from terragrip.ground.noise import noise_of
 from terragrip.ground.signals import GROUND, signals_of
-from terragrip.ground.steps import A_LENGTH, joined, steps_of
+from terragrip.ground.steps import A_LENGTH, crossing_variance, joined, steps_of
 from terragrip.soil.blocks import Blocks
 
 _MOST = 240
@@ -131,7 +131,7 @@ class OnlineChanges:
         self._signals = np.vstack([self._signals[1 - _MOST :], x])
         self._prior()
         self._prune()
-        return self._report(end)
+        return self._report(end, driven)
 
     def _learn(self, x: Floats, weight: Floats) -> None:
         """Weight the runs by their predictions, then add the block to each."""
@@ -158,7 +158,7 @@ class OnlineChanges:
             setattr(self, name, getattr(self, name)[keep])
         self._probability = self._probability / self._probability.sum()
 
-    def _report(self, now: float) -> Change | None:
+    def _report(self, now: float, driven: float) -> Change | None:
         self._quiet += 1
         recent = self._age <= min(_RECENT, self._quiet - 1)
         self.probability = float(self._probability[recent].sum())
@@ -168,7 +168,8 @@ class OnlineChanges:
         time = float((weight * at).sum())
         self._quiet = 0
         took = now - float(self._begin[-1])
-        std = float(np.sqrt((weight * (at - time) ** 2).sum() + took**2 / 12))
+        variance = (weight * (at - time) ** 2).sum() + took**2 / 12
+        std = float(np.sqrt(variance + crossing_variance(self._step, driven, took)))
         within = noise_of(self._signs[:, :2], LEVELS).within
         before, after = self._starts >= self._last, self._starts >= time
         cause = cause_of(self._signs[before & ~after], self._signs[after], within, self._pull)

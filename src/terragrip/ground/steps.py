@@ -71,6 +71,14 @@ def _spans_joined(blocks: Blocks, spans: list[tuple[int, int]]) -> Blocks:
     return Blocks(**out)
 
 
+def crossing_variance(step: float, way: float, seconds: float) -> float:
+    """Variance [s²] of a change's time, since a border is crossed over the vehicle's length: the change may be at either end of the crossing.
+
+    `step` [m] of `steps_of`; `way` [m] driven in `seconds` about the change. 0 where blocks are steps, or nothing is driven.
+    """
+    return (0.5 * A_LENGTH * step * seconds / way) ** 2 if way > 0 else 0.0
+
+
 def joined(one: Blocks, other: Blocks) -> Blocks:
     """The blocks of both, one after the other."""
     return Blocks(
