@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from steady_drive import TIME, log
+from terragrip.estimation.noise import settings_in
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_rest_warnings
 from terragrip.vehicle import Vehicle
 
 STOPS = (np.abs(TIME - 60) < 8) | (np.abs(TIME - 140) < 6)
+
+
+WHEEL = {"wheel": {"radius": 0.3, "inertia": 0.5}}
 
 
 def stopping(shift: float = 0.0, noise: np.ndarray | float = 0.0) -> Recording:
@@ -37,6 +42,20 @@ def test_a_right_zero_noise_without_a_sign_and_creeping_are_left_alone() -> None
     assert rest_warnings(stopping(0.0, np.where(STOPS, receiver, 0.0))) == []
     creep = np.where(np.abs(TIME - 60) < 8, 0.2, 0.0)  # in one stop of three: it slid
     assert rest_warnings(stopping(0.0, creep)) == []
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.1])
+def test_the_error_of_a_filtered_receiver_shows_where_the_wheels_stand(shift: float) -> None:
+    """It lasts for seconds, so fast changes show a fifth of it; a zero that is off is no noise."""
+    step = float(np.median(np.diff(TIME)))
+    kept, draws = np.exp(-step / 1.5), np.random.default_rng(5).standard_normal(len(TIME))
+    error = lfilter([0.04 * np.sqrt(1 - kept**2)], [1, -kept], draws)
+    vehicle = Vehicle.from_dict(
+        {"name": "cart", "mass": 300, "axles": {"a": {"mass": 300, "wheels": ["l", "r"]}}} | WHEEL
+    )
+    noise = settings_in(stopping(shift, error), vehicle)[0]["ground_speed"]
+    assert 0.025 < noise < 0.055
+    assert settings_in(stopping(shift), vehicle)[0]["ground_speed"] < 0.015
 
 
 @pytest.mark.parametrize("zero", [0.03, -0.03, 0.002])

@@ -94,6 +94,7 @@ def rounded_noise(recording: Recording, vehicle: Vehicle) -> dict[str, float]:
 def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float]) -> dict[str, float]:
     """SDs from the log for sensors that the vehicle file does not give, by channel."""
     from terragrip.recording import sensor_noise
+    from terragrip.recording.rest import noise_at_rest
 
     silent = {
         name: values
@@ -102,7 +103,10 @@ def logged_noise(recording: Recording, vehicle: Vehicle, held: dict[str, float])
     }
     if not silent:
         return {}
-    return sensor_noise(replace(recording, channels=silent), {k: v for k, v in held.items() if k in silent})
+    noise = sensor_noise(replace(recording, channels=silent), {k: v for k, v in held.items() if k in silent})
+    if "ground_speed" in noise and "ground_speed" not in recording.noise:
+        noise["ground_speed"] = max(noise["ground_speed"], noise_at_rest(recording))
+    return noise
 
 
 def sensor_of(channel: str) -> str:

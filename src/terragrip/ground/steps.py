@@ -72,7 +72,7 @@ def _spans_joined(blocks: Blocks, spans: list[tuple[int, int]]) -> Blocks:
 
 
 def crossing_variance(step: float, way: float, seconds: float) -> float:
-    """Variance [s²] of a change's time, since a border is crossed over the vehicle's length: the change may be at either end of the crossing.
+    """Variance [s²] of a change's time, since a border is crossed over the vehicle's length: it may be either end of that.
 
     `step` [m] of `steps_of`; `way` [m] driven in `seconds` about the change. 0 where blocks are steps, or nothing is driven.
     """

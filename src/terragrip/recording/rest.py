@@ -53,6 +53,17 @@ def rest_warnings(recording: Recording) -> list[str]:
     ]
 
 
+def noise_at_rest(recording: Recording) -> float:
+    """SD [m/s] of the ground speed where all wheels stand for long, in the usual stop; 0 where none shows it. It holds errors with memory,
+    as a receiver filters them, which fast changes do not show (`noise.white_noise`); a zero that is off everywhere does not count."""
+    ground = recording.channels.get("ground_speed")
+    read = [] if ground is None else _read(ground, _stops(recording)[0])
+    if not read:
+        return 0.0
+    shift = _alike(read)
+    return median(np.array([float(np.sqrt(np.mean((values - shift) ** 2))) for values in read]))
+
+
 def turn_rest_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     """A sentence where the gyroscope reads much the same rate of turn, not 0, whenever all wheels stand for long."""
     yaw, ground = (recording.channels.get(name) for name in ("angular_velocity_z", "ground_speed"))
