@@ -289,6 +289,25 @@ def test_noise_at_rest_gives_no_radius() -> None:
     assert not any("radius" in word for word in _propose(columns)["wheel_speed_fl"].evidence)
 
 
+def test_a_gyroscope_comes_before_the_rate_of_turn_of_odometry() -> None:
+    """The receiver's filtered rate was chosen, surely, where both were in the log and its topic came first."""
+    rate, gyro = "/gps/odom.twist.twist.angular.z", "/imu/data.angular_velocity.z"
+    columns = {rate: 1.05 * np.sin(TIME / 4), gyro: np.sin(TIME / 4)}
+    assert _propose(columns)["angular_velocity_z"].columns == (gyro,)
+    assert _propose({rate: columns[rate]})["angular_velocity_z"].columns == (rate,)
+
+
+def test_a_rate_of_turn_that_follows_from_the_wheels_is_asked_for() -> None:
+    """It was a gyroscope's, surely, and the hubs then turn as the rims do: no slip in turns."""
+    left, right = SPEED - 0.3 * np.sin(TIME / 4), SPEED + 0.3 * np.sin(TIME / 4)
+    columns = {"wheel speed l [m/s]": left, "wheel speed r [m/s]": right}
+    rate = "/odom.twist.twist.angular.z"
+    made = _propose({**columns, rate: (right - left) / 0.6})["angular_velocity_z"]
+    assert "follows from the wheel speeds" in made.doubt
+    slips = _propose({**columns, rate: (right - left) / 0.6 * (1 + 0.1 * np.sin(TIME))})["angular_velocity_z"]
+    assert not slips.doubt
+
+
 def test_odometry_is_no_ground_speed() -> None:
     result = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
     assert result["ground_speed"].columns == ("gps_speed_mps",)

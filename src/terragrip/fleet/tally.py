@@ -32,6 +32,7 @@ POSSIBLE = {
 }
 """Least and greatest mean of a log that a machine can have: a wide margin about what tyres, tracks and soils do, for wrong units and
 another machine's vehicle file. Efficiency: near no power a mean is far below zero; none is above one, but for errors."""
+_PUSHED = -0.01  # of the weight: some of the tyres' resistance, which is all that is left of torques that are much too small
 COUNTED = tuple(name for name in EVENTS if name)
 
 
@@ -143,6 +144,9 @@ def impossible(row: Mapping[str, Any]) -> str:
         for name, (low, high) in POSSIBLE.items()
         if row[name] is not None and not low <= row[name] <= high
     ]
+    pushed = ("adhesion", "soil_resistance")  # alone the former is a way downhill, the latter a measured pull
+    if not wrong and all(row[name] is not None and row[name] < _PUSHED for name in pushed):
+        wrong = [f"{name.replace('_', ' ')} {row[name]:.3g}" for name in pushed]
     return f"no machine has a mean {' and '.join(wrong)}: check its vehicle file and units" if wrong else ""
 
 

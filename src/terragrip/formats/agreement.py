@@ -54,7 +54,8 @@ class Agreement:
             del ranked[channel]
 
     def _odometry(self, ranked: Ranked) -> None:
-        """Odometry that does not follow from the wheel speeds may be smoothed, fused or a camera's: a doubt."""
+        """Odometry's speed that does not follow from the wheel speeds may be smoothed, fused or a camera's, its rate of turn that does is
+        no gyroscope's: a doubt."""
         rims = [g.column.column for c in ranked if c.startswith("wheel_speed_") and (g := surest(ranked, c))]
         for k, guess in enumerate(ranked.get("wheel_based_speed", ())):
             if len(rims) < 2 or not guess.column.name.has("odometry") or guess.column.name.has("wheel"):
@@ -63,6 +64,11 @@ class Agreement:
             if rest is not None and rest > _NOT_OF_WHEELS:
                 doubt = f"differs by {rest:.0%} from what the wheel speeds make of it: if a camera's or a lidar's, it is ground_speed?"
                 ranked["wheel_based_speed"][k] = replace(guess, confidence=0.4, doubt=doubt)
+        for k, guess in enumerate(ranked.get("angular_velocity_z", ())):
+            rest = self._evidence.beyond(guess.column.column, rims) if len(rims) > 1 else None
+            if rest is not None and rest < _NOT_OF_WHEELS:
+                doubt = "follows from the wheel speeds: no gyroscope?"
+                ranked["angular_velocity_z"][k] = replace(guess, confidence=0.4, doubt=doubt)
 
     def _two_scales(self, ranked: Ranked) -> None:
         """Of two speeds over ground that go together and are of other sizes one is of another scale; nothing shows which."""

@@ -222,7 +222,12 @@ def _of_motion(column: Column) -> list[Candidate]:
             0.85,
             "the rate of an angle",
         ),
-        (angular and name.has("odometry"), gyro, 0.6, "odometry's rate of turn and an axis"),
+        (
+            angular and (name.has("odometry") or "twist" in name.words),
+            gyro,
+            0.6,
+            "a rate of turn, of odometry or a twist, and an axis",
+        ),
         (angular, gyro, 0.85, "a gyro and an axis"),
         (axis and rate and not name.has("position"), gyro, 0.7, "a rate and an axis"),
         (
