@@ -176,9 +176,7 @@ def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
 
 
 @pytest.mark.parametrize("mass", ["1 kg", "100 t"])
-def test_a_log_with_another_machines_vehicle_file_counts_in_no_mean(
-    place: Path, ran: Ran, mass: str
-) -> None:
+def test_a_log_with_another_machines_vehicle_file_counts_in_no_mean(place: Path, ran: Ran, mass: str) -> None:
     """A robot's log with a tractor's file had a mean adhesion of -0.11, as the ground pushed it all the way, and counted."""
     vehicle = place / "Heros.yaml"
     vehicle.write_text(vehicle.read_text().replace("100 kg", mass))

@@ -91,6 +91,44 @@ def test_a_unit_behind_a_name_counts_before_one_that_attrs_kept() -> None:
     np.testing.assert_allclose(Recording.from_frame(log)["ground_speed"], 1 / 3.6)
 
 
+@pytest.mark.parametrize("name", ["groud_speed", "Ground_Speed", "v"])
+def test_a_unit_of_no_column_is_named_where_a_channel_has_none(name: str) -> None:
+    """A misspelt name, or one renamed since, dropped its unit without a word: 3.6 times the speed."""
+    log = LOG.copy()
+    log.attrs["units"] = {name: "km/h"}
+    (note,) = frame_of(log, None).notes
+    assert f"states {name} in km/h, but has no such column" in note
+    assert "ground_speed in m/s" in note
+    log.attrs["units"] = {name: "km/h", "ground_speed": "m/s", "force": "kN", "other": "V", "angle": ""}
+    assert not frame_of(log, None).notes  # a column of before, whose unit nothing else lacks
+
+
+@pytest.mark.parametrize("key", ["unit", "Units"])
+def test_a_unit_may_stand_under_unit_or_units(key: str) -> None:
+    """Each but one of the two was dropped without a word, of an Arrow field the other."""
+    log = LOG.copy()
+    log.attrs[key] = {"ground_speed": "km/h"}
+    field = pa.field("ground_speed", pa.float64(), metadata={key: "km/h"})
+    table = pa.Table.from_pandas(LOG)
+    table = table.set_column(1, field, table.column(1))
+    variable = KMH.view(type("Own", (Variable,), {"attrs": {key: "km/h"}}))
+    for one in (log, pa.Table.from_pandas(log), table, {**LOG, "ground_speed": variable}):
+        np.testing.assert_allclose(Recording.from_frame(one)["ground_speed"], KMH / 3.6)
+
+
+@pytest.mark.parametrize(
+    "attrs", [{"ground_speed": "km/h"}, {"units": ["s", "km/h", "rad/s"]}, {"units": "km/h"}]
+)
+def test_units_that_attrs_state_otherwise_than_by_column_are_refused(attrs: dict[str, object]) -> None:
+    """They were dropped without a word."""
+    log = LOG.copy()
+    log.attrs = attrs
+    with pytest.raises(InputError, match="attrs states units otherwise than by column; write attrs"):
+        Recording.from_frame(log)
+    log.attrs = {"ground_speed": "from a radar", "units": None}
+    Recording.from_frame(log)
+
+
 def test_a_unit_of_another_quantity_is_refused() -> None:
     log = LOG.copy()
     log.attrs["units"] = {"ground_speed": "N"}

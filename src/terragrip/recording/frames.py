@@ -37,7 +37,7 @@ def frame_of(table: Any, source: str | None) -> Frame:
     """
     columns = columns_of(table, source)
     names, behind = names_and_units(list(columns))
-    stated = _beside(table)
+    stated = _beside(table, source)
     beside = {name: stated[whole] for whole, name in zip(columns, names, strict=True) if whole in stated}
     beside = {name: unit for name, unit in beside.items() if unit and name not in behind}
     foreign = [f"{n} in {u}" for n, u in beside.items() if _is_foreign(n, u)]
@@ -51,7 +51,30 @@ def frame_of(table: Any, source: str | None) -> Frame:
     )
     if any(not one.equals(indices[0]) for one in indices):
         notes += ("The indices of the table's Series differ: rows are taken by their place, not by index.",)
-    return Frame(dict(zip(names, columns.values(), strict=True)), {**beside, **behind}, notes)
+    bare = [name for name in names if name not in {**beside, **behind}]
+    return Frame(
+        dict(zip(names, columns.values(), strict=True)),
+        {**beside, **behind},
+        notes + _of_no_column({name: unit for name, unit in stated.items() if name not in columns}, bare),
+    )
+
+
+def _of_no_column(lost: Mapping[str, str], bare: Iterable[str]) -> tuple[str, ...]:
+    """A sentence on units whose column is misspelt or renamed, where a channel without a unit may be meant."""
+    channels = [name for name in bare if unit_of(name) is not None]
+    meant = {
+        f"{name} in {unit}": near
+        for name, unit in lost.items()
+        if (near := [c for c in channels if _is_foreign(c, unit, other=False)])
+    }
+    if not meant:
+        return ()
+    counted = list(dict.fromkeys(f"{c} in {unit_of(c)}" for near in meant.values() for c in near))
+    more = ", ..." if len(counted) > 3 else ""
+    return (
+        f"The table states {', '.join(meant)}, but has no such column; what it has counts as {', '.join(counted[:3])}{more}. "
+        "Write units under the columns' own names.",
+    )
 
 
 def in_si(
@@ -78,18 +101,41 @@ def units_of_fields(schema: Any) -> dict[str, str]:
     """The units that an Arrow schema states, by column: its fields' metadata ``unit``, or pandas' ``attrs["units"]``."""
     try:
         pandas = json.loads((schema.metadata or {}).get(b"pandas", b"{}"))
-        result = _texts(pandas["attributes"]["units"])
+        result = _texts(_stated(pandas["attributes"]))
     except (ValueError, KeyError, TypeError, RecursionError):  # damaged, or none stated
         result = {}
-    units = {field.name.strip(): (field.metadata or {}).get(b"unit", b"") for field in schema}
+    units = {
+        field.name.strip(): _stated(
+            {k.decode("utf-8", "replace"): v for k, v in (field.metadata or {}).items()}
+        )
+        for field in schema
+    }
     return result | {name: unit.decode("utf-8", "replace") for name, unit in units.items() if unit}
 
 
-def _beside(table: Any) -> dict[str, str]:
-    """The units that a table, or each of its columns, states beside the names."""
+def _stated(attributes: Mapping[Any, Any]) -> Any:
+    """What stands under ``units``, ``unit``, ``Units`` ... of a table's or a column's attributes; None if nothing."""
+    return next((v for k, v in attributes.items() if str(k).strip().lower() in ("unit", "units")), None)
+
+
+def _beside(table: Any, source: str | None) -> dict[str, str]:
+    """The units that a table, or each of its columns, states beside the names.
+
+    Raises InputError where its attributes state them in another way than by a column's name, which would be a unit dropped.
+    """
     if hasattr(table, "column_names"):
         return units_of_fields(table.schema)
-    stated = _texts(getattr(table, "attrs", {}).get("units"))
+    attributes = getattr(table, "attrs", {})
+    units = _stated(attributes)
+    stray = [name for name in getattr(table, "columns", ()) if is_common(str(attributes.get(name, " ")))]
+    if stray or isinstance(units, list | tuple) or (isinstance(units, str) and is_common(units)):
+        name, unit = (stray[0], attributes[stray[0]]) if stray else ("ground_speed", "km/h")
+        raise InputError(
+            "attrs states units otherwise than by column",
+            file=source,
+            hint=f"write attrs['units'] = {{{str(name)!r}: {str(unit)!r}, ...}}",
+        )
+    stated = _texts(units)
     if isinstance(table, Mapping):  # of xarray's variables, pandas' Series, pint's quantities
         return stated | _texts({name: _of_column(name, column) for name, column in _variables(table)})
     kinds = getattr(table, "dtypes", None)
@@ -99,18 +145,20 @@ def _beside(table: Any) -> dict[str, str]:
 
 def _of_column(name: Any, column: Any) -> Any:
     """The unit that a column of a mapping states; a Series of a frame has that frame's ``attrs``, the units of all columns."""
-    units = getattr(column, "attrs", {}).get("units", getattr(column, "units", None))
+    units = _stated(getattr(column, "attrs", {}))
+    units = getattr(column, "units", None) if units is None else units
     if not isinstance(units, Mapping):
         return units
     return units.get(column.name, units.get(name))
 
 
-def _is_foreign(name: str, unit: str) -> bool:
+def _is_foreign(name: str, unit: str, *, other: bool = True) -> bool:
+    """Whether a channel's unit is not ours; ``other``: what is said of one of another quantity."""
     target = unit_of(name)
     try:
         return target is not None and factor_to(unit, target) != 1.0
     except UnitError:
-        return True
+        return other
 
 
 def _texts(units: Any) -> dict[str, str]:
