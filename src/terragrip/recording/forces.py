@@ -32,6 +32,7 @@ _BRAKED = 1e-6  # of a window: what a brake does is in no torque
 _LEAST = 40.0  # s of driving: in 22 s one start outweighs all blocks (a right log in 531 was named)
 _BLOCKS = 12  # for the jackknife
 _STARTS = 2.5  # blocks among which the rims' change is spread, by its squares: a start or two have no scatter
+_COMMANDED = 0.1  # of what thrust and pull vary by (SD): where the rims change less, what the load does to them outweighs what they command
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates, of a pull with that just before and after: below it nothing stands out of noise
 _ACCELERATION = 1.8  # against both the ground's and the rims' rate
@@ -191,6 +192,10 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     and ground speed, or nothing is said.
     """
     if courses is None or courses.thrust is None:
+        return []
+    # of torques or a pull of another scale the other one shows what the load does
+    load = min(np.std(course) for course in (courses.thrust, courses.pull) if course is not None)
+    if np.std(courses.rims) < _COMMANDED * load:
         return []
     # a receiver filters, and its speed is late
     change = courses.rims if courses.shown is None else courses.shown
