@@ -54,17 +54,21 @@ _MAGIC = (
         (magic, f"is packed by {name}", f"unpack it first: {name} -d FILE")
         for magic, name in ((b"\x28\xb5\x2f\xfd", "zstd"), (b"\xfd7zXZ", "xz"), (b"BZh", "bzip2"))
     ),
+    *(
+        (magic, "is XML", "export it as CSV, ISOXML's TASKDATA by the terminal's own software")
+        for magic in (b"<?xml", b"\xef\xbb\xbf<?xml")
+    ),
     (b"\x93NUMPY", "is a NumPy array without column names", "save it as CSV or Parquet with a header"),
 )
 
 
 def to_text(data: bytes, source: str) -> bytes:
     """The content as UTF-8 without a byte order mark; raises InputError if it is no text."""
-    if data.startswith(b"\xef\xbb\xbf"):
-        return data[3:]
     for magic, problem, hint in _MAGIC:
         if data.startswith(magic):
             raise InputError(problem, file=source, hint=hint)
+    if data.startswith(b"\xef\xbb\xbf"):
+        return data[3:]
     head = data[:HEAD]
     encoding = None
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):

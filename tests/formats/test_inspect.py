@@ -259,9 +259,11 @@ def test_a_speed_that_says_nothing_is_named_and_a_shaft_is_no_ground(tmp_path: P
         "time": time,
         "WheelBasedVehicleSpeed": 0.0 * time,
         "RearPTOSpeed": 540 + np.sin(time),
+        "Draft (lbs)": 551.4 + 0.0 * time,  # nothing is towed, was said
     }
     pd.DataFrame(frame).to_csv(path, index=False)
     inspection = inspect(path)
+    assert "Draft has the name of drawbar_force, but is 551.4 throughout." in inspection.warnings
     assert "ground_speed" not in inspection.recognised
     assert any(
         "WheelBasedVehicleSpeed has the name of wheel_based_speed, but is 0 throughout" in w

@@ -284,16 +284,18 @@ def test_our_own_estimates_are_no_log(tmp_path: Path) -> None:
             reader(tmp_path / "e.mat")
 
 
-@pytest.mark.parametrize("nested", ["", "log/"])
-def test_units_among_the_attributes_of_hdf5_are_used(tmp_path: Path, nested: str) -> None:
-    """As netCDF and xarray write them; km/h were m/s and milliseconds seconds without a word."""
+@pytest.mark.parametrize(
+    ("nested", "key"), [("", "units"), ("log/", "units"), ("", "unit"), ("log/", "Unit")]
+)
+def test_units_among_the_attributes_of_hdf5_are_used(tmp_path: Path, nested: str, key: str) -> None:
+    """As netCDF and xarray write them; km/h were m/s and milliseconds seconds without a word. A test bench has 'unit'."""
     path = tmp_path / "log.h5"
     units = {"ground_speed": "km/h", "time": np.bytes_("ms"), "latitude": "degrees_north"}
     with h5py.File(path, "w") as file:
         for name, values in {"time": 1000 * TIME, **OURS, "latitude": 50 + 0 * TIME}.items():
             dataset = file.create_dataset(nested + name, data=values)
             if name in units:
-                dataset.attrs["units"] = units[name]
+                dataset.attrs[key] = units[name]
     table = read_table(path)
     prefix = nested.replace("/", ".")
     assert table.units == {f"{prefix}ground_speed": "km/h", f"{prefix}latitude": "degrees"}

@@ -212,6 +212,15 @@ def test_an_autopilots_log_is_refused_with_what_makes_a_table_of_it(tmp_path: Pa
         read(path)
 
 
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_xml_is_no_table(tmp_path: Path, mark: str) -> None:
+    """'column time: is missing; map the log's columns in a profile' was said of ISOXML."""
+    path = tmp_path / "TASKDATA.XML"
+    path.write_text(f'{mark}<?xml version="1.0"?>\n<ISO11783_TaskData/>\n', encoding="utf-8")
+    with pytest.raises(InputError, match="is XML; export it as CSV, ISOXML's TASKDATA by the terminal's"):
+        read(path)
+
+
 @pytest.mark.parametrize("of_wheels", [True, False])
 def test_odometry_is_the_wheels_beyond_doubt_where_it_follows_from_them(of_wheels: bool) -> None:
     """A camera's odometry of an unknown name was the wheels' own speed, without a question mark."""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.formats.matlab_values import Array, Opaque
+from terragrip.recording.frames import stated_unit
 
 _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
@@ -28,8 +29,8 @@ def tree_of(file: Any, h5py: Any) -> dict[str, Any]:
 
 
 def _with_units(group: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """A group's parts and, as a struct of units beside them, what the attributes ``units`` of its datasets state, as netCDF has them."""
-    stated = {name: group[name].attrs.get("units") for name in parts}
+    """A group's parts and, as a struct of units beside them, what the attributes ``units`` (or ``unit``) of its datasets state."""
+    stated = {name: stated_unit(group[name].attrs) for name in parts}
     texts = {n: u.decode("utf-8", "replace") if isinstance(u, bytes) else u for n, u in stated.items()}
     # degrees_north; a netCDF's time is in "seconds since ..."
     units = {n: re.sub("_(north|east)$| since .*", "", u) for n, u in texts.items() if isinstance(u, str)}

@@ -182,14 +182,15 @@ def _held_against(vehicle: Vehicle | None, channel: str, proposal: Proposal) -> 
 def silent(
     numbers: Mapping[str, Floats], proposals: Mapping[str, Proposal], units: Mapping[str, str]
 ) -> list[str]:
-    """Sentences on columns that go by the name of a speed or torque which was not found, but hold nothing or never change."""
+    """Sentences on columns that go by the name of a speed, torque or pull that no other is, but hold nothing or never change."""
     notes = []
+    named = ("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_", "drawbar_force")
     for name, column in columns_of(tuple(numbers), {}, units, GENERAL).items():
         values = numbers[name]
         guess = next(iter(candidates_of(column)), None)
         if guess is None or guess.channel in proposals or varies(values):
             continue
-        if guess.channel.startswith(("ground_speed", "wheel_based_speed", "wheel_speed_", "drive_torque_")):
+        if guess.channel.startswith(named):
             known = values[np.isfinite(values)]
             held = f"is {known[0]:.4g} throughout" if len(known) else "has no value"
             notes.append(f"{name} has the name of {guess.channel}, but {held}.")

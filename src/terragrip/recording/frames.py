@@ -101,11 +101,11 @@ def units_of_fields(schema: Any) -> dict[str, str]:
     """The units that an Arrow schema states, by column: its fields' metadata ``unit``, or pandas' ``attrs["units"]``."""
     try:
         pandas = json.loads((schema.metadata or {}).get(b"pandas", b"{}"))
-        result = _texts(_stated(pandas["attributes"]))
+        result = _texts(stated_unit(pandas["attributes"]))
     except (ValueError, KeyError, TypeError, RecursionError):  # damaged, or none stated
         result = {}
     units = {
-        field.name.strip(): _stated(
+        field.name.strip(): stated_unit(
             {k.decode("utf-8", "replace"): v for k, v in (field.metadata or {}).items()}
         )
         for field in schema
@@ -113,9 +113,9 @@ def units_of_fields(schema: Any) -> dict[str, str]:
     return result | {name: unit.decode("utf-8", "replace") for name, unit in units.items() if unit}
 
 
-def _stated(attributes: Mapping[Any, Any]) -> Any:
+def stated_unit(attributes: Mapping[Any, Any]) -> Any:
     """What stands under ``units``, ``unit``, ``Units`` ... of a table's or a column's attributes; None if nothing."""
-    return next((v for k, v in attributes.items() if str(k).strip().lower() in ("unit", "units")), None)
+    return next((attributes[k] for k in attributes if str(k).strip().lower() in ("unit", "units")), None)
 
 
 def _beside(table: Any, source: str | None) -> dict[str, str]:
@@ -126,7 +126,7 @@ def _beside(table: Any, source: str | None) -> dict[str, str]:
     if hasattr(table, "column_names"):
         return units_of_fields(table.schema)
     attributes = getattr(table, "attrs", {})
-    units = _stated(attributes)
+    units = stated_unit(attributes)
     stray = [name for name in getattr(table, "columns", ()) if is_common(str(attributes.get(name, " ")))]
     if stray or isinstance(units, list | tuple) or (isinstance(units, str) and is_common(units)):
         name, unit = (stray[0], attributes[stray[0]]) if stray else ("ground_speed", "km/h")
@@ -145,7 +145,7 @@ def _beside(table: Any, source: str | None) -> dict[str, str]:
 
 def _of_column(name: Any, column: Any) -> Any:
     """The unit that a column of a mapping states; a Series of a frame has that frame's ``attrs``, the units of all columns."""
-    units = _stated(getattr(column, "attrs", {}))
+    units = stated_unit(getattr(column, "attrs", {}))
     units = getattr(column, "units", None) if units is None else units
     if not isinstance(units, Mapping):
         return units
