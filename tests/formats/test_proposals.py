@@ -503,6 +503,25 @@ def test_two_speeds_over_ground_of_other_sizes_are_a_question(size: float) -> No
 
 
 @pytest.mark.parametrize(
+    ("name", "unit"),
+    [("drawbar_force_daN", "daN"), ("Zugkraft daN", "daN"), ("draft_kgf", "kgf")],
+)
+def test_a_unit_at_a_names_end_is_read_whole(name: str, unit: str) -> None:
+    """force_daN was in N, surely, a tenth: its capital began a word."""
+    proposal = _propose({name: 2000 + SPEED})["drawbar_force"]
+    assert (proposal.unit, proposal.is_doubtful) == (unit, False)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("motor_current_{}_mA", None), ("motor_current_{}", "mA")])
+def test_the_constant_of_a_current_is_asked_for_in_its_unit(name: str, unit: str | None) -> None:
+    """'in A; the scale in N m per A' was said of mA, of which torques were 1000 times as large."""
+    columns = {name.format(side): 2000 + SPEED for side in ("rl", "rr")}
+    stated = dict.fromkeys(columns, unit) if unit else {}
+    proposal = _propose(columns, stated)["drive_torque_rl"]
+    assert "the scale in N m per mA times the gear ratio must be given by you" in proposal.give
+
+
+@pytest.mark.parametrize(
     ("name", "channel"), [("Zugkraft {} [kN]", "drawbar_force"), ("hitch vertical {} [kN]", "hitch_load")]
 )
 def test_the_two_pins_of_a_hitch_are_added(name: str, channel: str) -> None:

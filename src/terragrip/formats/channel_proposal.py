@@ -94,7 +94,7 @@ def _entry(
     is_current = torque and kind in ("current", None) and column.name.has("current")
     if is_current or (torque and kind == "share"):
         side = " times the gear ratio" if column.name.has("motor") else ""
-        what, of = ("a current", "A") if is_current else ("a torque in %", "%")
+        what, of = ("a current", column.unit or "A") if is_current else ("a torque in %", "%")
         entry |= {"scale": 1.0, "unit": "N m"} if column.unit else {"scale": 1.0}
         return entry, f"{what}: the scale in N m per {of}{side} must be given by you", ()
     if wheel_speed and kind == "speed" and unit is not None:

@@ -48,9 +48,10 @@ _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": 
 _OF_MESSAGES = frozenset({"fix", "status", "state", "raw", "exp"})
 """Words that name messages, topics and experiments too, and then say nothing of each field in them."""
 _BEHIND = re.compile(
-    r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*)[>}]?$"
+    r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*"
+    r"|(?:da|[mkh])(?:A|Nm?|Pa|V|W))[>}]?$"
 )
-"""A unit without brackets that is no word: n in 1/min, yaw rate <°/s>."""
+"""A unit without brackets that is no word: n in 1/min, yaw rate <°/s>; or of two, if its capital began one: force_daN, I_mA."""
 _SOURCE = re.compile(r"(\([^()]*\)|\[[^\[\]]*\])\s*\*(\w+)$")
 """Vehicle Speed (km/h) *OBD: the source behind the unit."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
