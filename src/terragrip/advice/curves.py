@@ -81,11 +81,16 @@ class CurveDraws:
         return free
 
 
-def adhesion(parameters: Floats, slip: Floats) -> Floats:
-    """mu (draws, slips) of parameters (draws, 8) at measured slips (draws, slips)."""
-    height, rate, fall, error, level, _, shape, share = (parameters[:, i, None] for i in range(len(NAMES)))
-    s = slip - error
-    return np.asarray(share * level + np.exp(height) * shape_at(s, rate, fall, shape))
+def adhesion(parameters: Floats, slip: Floats, shape: Floats | None = None) -> Floats:
+    """mu (draws, slips) of parameters (draws, 8) at measured slips (draws, slips); ``shape``: `_shape` of these, if it is known."""
+    height, level, share = (parameters[:, NAMES.index(name), None] for name in ("ln A", "r_0", "c"))
+    return np.asarray(share * level + np.exp(height) * (_shape(parameters, slip) if shape is None else shape))
+
+
+def _shape(parameters: Floats, slip: Floats) -> Floats:
+    """h(q(p) k s; p) - f s (draws, slips): what of the adhesion depends on ln k, f, e and p alone."""
+    rate, fall, error, power = (parameters[:, NAMES.index(name), None] for name in ("ln k", "f", "e", "p"))
+    return shape_at(slip - error, rate, fall, power)
 
 
 def resistance(parameters: Floats, slip: Floats) -> Floats:
@@ -181,14 +186,13 @@ def _fit(
     slip = np.where(enough, slip, 0.0)
     lower, upper = LOWER.copy(), UPPER.copy()
     lower[E], upper[E] = -4 * prior_sd[E], 4 * prior_sd[E]
-    steepness = np.zeros_like(mu)
+    of_mu, of_rho = np.ones_like(mu), np.sqrt(rho_sd**2 + (0.05 * rho) ** 2 + 1e-6)
 
-    def residual(p: Floats) -> Floats:
-        of_mu = np.sqrt(mu_sd**2 + (steepness * slip_sd) ** 2 + (MISFIT * mu) ** 2 + 1e-6)
-        of_rho = np.sqrt(rho_sd**2 + (0.05 * rho) ** 2 + 1e-6)
-        a = np.where(enough, (adhesion(p, slip) - mu) / of_mu, 0.0)
-        b = np.where(enough, (resistance(p, slip) - rho) / of_rho, 0.0)
-        return np.concatenate([a, b, (p - prior) / prior_sd], axis=1)
+    def by_adhesion(p: Floats, shape: Floats | None = None) -> Floats:
+        return np.where(enough, (adhesion(p, slip, shape) - mu) / of_mu, 0.0)
+
+    def by_resistance(p: Floats) -> Floats:
+        return np.where(enough, (resistance(p, slip) - rho) / of_rho, 0.0)
 
     x = np.clip(prior, lower, upper)
     x[:, 0] = np.log(np.maximum(1.3 * np.where(enough, mu, 0).max(axis=1), 0.02))
@@ -197,20 +201,28 @@ def _fit(
         if turn in (0, 8, 16):
             h = 1e-3
             steepness = (adhesion(x, slip + h) - adhesion(x, slip - h)) / (2 * h)
-        now = residual(x)
+            of_mu = np.sqrt(mu_sd**2 + (steepness * slip_sd) ** 2 + (MISFIT * mu) ** 2 + 1e-6)
+        shape = _shape(x, slip)
+        a, b = by_adhesion(x, shape), by_resistance(x)
+        now = np.concatenate([a, b, (x - prior) / prior_sd], axis=1)
         cost = (now**2).sum(axis=1)
         columns = []
-        for i in range(x.shape[1]):
+        for i, name in enumerate(NAMES):
             moved = x.copy()
             moved[:, i] += 1e-5
-            columns.append((residual(moved) - now) / 1e-5)
+            moved_a = by_adhesion(moved, None if name in ("ln k", "f", "e", "p") else shape)
+            moved_b = by_resistance(moved) if name in ("e", "r_0", "r_1") else b
+            columns.append(
+                (np.concatenate([moved_a, moved_b, (moved - prior) / prior_sd], axis=1) - now) / 1e-5
+            )
         jacobian = np.stack(columns, axis=-1)
         transposed = jacobian.transpose(0, 2, 1)
         gradient, normal = transposed @ now[..., None], transposed @ jacobian
         diagonal = np.einsum("bkk->bk", normal)
         damped = normal + (damping[:, None] * diagonal)[:, :, None] * np.eye(x.shape[1])
         trial = np.clip(x - np.linalg.solve(damped, gradient)[..., 0], lower, upper)
-        better = (residual(trial) ** 2).sum(axis=1) < cost
+        tried = np.concatenate([by_adhesion(trial), by_resistance(trial), (trial - prior) / prior_sd], axis=1)
+        better = (tried**2).sum(axis=1) < cost
         x = np.where(better[:, None], trial, x)
         damping = np.clip(np.where(better, damping / 4, damping * 6), 1e-8, 1e8)
     return x
