@@ -52,9 +52,11 @@ undrawn_in_file = pytest.fixture(_undrawn, name="undrawn_in_file", scope="module
 
 @pytest.fixture(scope="module")
 def unchecked() -> Generator[None]:
-    """No log is searched for what is likely wrong in it: for tests of the estimates alone, which take half of the time then."""
+    """No log is searched for what is likely wrong in it: for tests of estimates or of a calibration alone, which take up to half of the
+    time then."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("terragrip.estimation.batch.notes_of", lambda _, recording: tuple(recording.notes))
+        patch.setattr("terragrip.estimation.calibration.procedure._doubts", lambda *_: ())
         yield
 
 

@@ -16,6 +16,8 @@ from terragrip.estimation.estimates import Estimates
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 METHODS = ("kalman", "bank", "ukf", "aukf-fs", "algebraic")
 AT = (0.2, 0.5)  # of the tank: m ahead of the rear axle, m high
 

@@ -184,11 +184,11 @@ def steady_sensitivity(*constants: Constant) -> Array:
     considered = Considered(filter.model, constants, dtype)
     held = Input(0.2 * (0.3 + 0.02) * LOAD + 0.2 * 2.0 * 4.0, LOAD, 0.3 * LOAD.sum() - 0.1 * 139 * 9.81)
     y, r = np.array([4.0] * 4 + [0.7, np.nan]), np.array([1e-3] * 4 + [4e-4, 1.0])
-    for _ in range(1500):
+    for _ in range(600):
         x = filter.moments()[0]
-        step = filter.step(0.02, held, held, np.zeros(10), y, r)
+        step = filter.step(0.05, held, held, np.zeros(10), y, r)
         assert step.prediction is not None
-        considered.predict(step.prediction, x, held, 0.02)
+        considered.predict(step.prediction, x, held, 0.05)
         considered.update(step.update, step.prediction.mean, held)
     return considered.sensitivity
 

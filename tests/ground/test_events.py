@@ -22,6 +22,8 @@ from terragrip.vehicle import Vehicle
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))  # for snow_runs.py
 from snow_runs import RADIUS, RUNS, healthy_snow, rover, snow_run
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 
 def dig(curve="saturating", rate=100.0):
     """A robot without a drawbar cell on its way into a soft spot in which it digs itself in: four wheels, of the first kind of curve."""

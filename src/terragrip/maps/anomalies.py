@@ -11,6 +11,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.maps.cells import Cells
+from terragrip.recording.ranks import median
 
 AROUND = 96
 """Cells around one, the nearest beyond `CORE`, whose median is what it should be."""
@@ -227,7 +228,7 @@ def _against(patch: Ints, cells: Cells, tree: Any, constants: Floats) -> tuple[f
     around its single cells reach past the rest of a narrow strip, which is no patch."""
     weight = 1 / np.maximum(cells.std[patch] ** 2 - cells.constant[patch] ** 2, 1e-12)
     value, *shared = np.average(
-        np.column_stack([cells.value, constants])[patch], axis=0, weights=weight
+        np.column_stack([cells.value[patch], constants[patch]]), axis=0, weights=weight
     ).tolist()
     std = float(np.hypot.reduce([1 / np.sqrt(weight.sum()), *shared]))
     return value, _beside(patch, cells, tree, value), std
@@ -252,9 +253,9 @@ def _beside(patch: Ints, cells: Cells, tree: Any, value: float) -> float:
     place = tree.data
     middle = place[patch].mean(axis=0)
     reach = np.hypot(*(place[patch] - middle).T).max() + 2 * CORE
-    near = np.array(tree.query_ball_point(middle, reach))
+    near = np.array(tree.query_ball_point(middle, reach, return_sorted=False))
     near = near[cKDTree(place[patch]).query(place[near])[0] > SMOOTH]
     offset = place[near] - middle
     sides = [near[sign * offset[:, axis] > 0] for axis in (0, 1) for sign in (-1, 1)]
-    medians = [float(np.median(cells.value[side])) for side in sides if len(side) >= SIDE]
+    medians = [median(cells.value[side]) for side in sides if len(side) >= SIDE]
     return float(np.clip(value, min(medians), max(medians))) if medians else value

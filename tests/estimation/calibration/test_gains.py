@@ -19,6 +19,8 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 GAIN = np.array([1.02, 0.97, 1.03, 0.99])
 RELATIVE = GAIN / np.exp(np.mean(np.log(GAIN)))
 RADIUS = 0.2

@@ -15,6 +15,8 @@ from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 from window_table import table
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 WHEELS = ("fl", "fr", "rl", "rr")
 Make = Callable[..., Recording]
 

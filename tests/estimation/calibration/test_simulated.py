@@ -10,6 +10,8 @@ import pytest
 from terragrip.estimation import Calibration, calibrate
 from terragrip.simulation import Scenario, simulate
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 SEEDS = range(2000, 2008)
 WHEELS = ("fl", "fr", "rl", "rr")
 FREE = {

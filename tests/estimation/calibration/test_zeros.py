@@ -15,6 +15,8 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("unchecked")
+
 OFFSET = (0.5, -0.4, 0.2, -0.1)
 WHEELS = ("fl", "fr", "rl", "rr")
 Make = Callable[..., Recording]

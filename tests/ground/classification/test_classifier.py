@@ -233,7 +233,7 @@ def test_the_same_seed_gives_the_same_classifier_and_scikit_learn_can_clone_it(h
     first = GroundClassifier(max_windows=40, random_state=3)
     second = clone(first)
     assert second.get_params() == first.get_params()
-    learnt = drives(TRAINED)
+    learnt = drives(range(1000, 1002), ("hard", "loose"), seconds=20.0)
     a = first.fit(*learnt).predict_proba(held_out[0])
     assert np.array_equal(a, second.fit(*learnt).predict_proba(held_out[0]))
     assert first.n_features_in_ == len(first.feature_names_in_)
