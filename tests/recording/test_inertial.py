@@ -80,6 +80,19 @@ def test_a_late_gyroscope_alone_is_named_alone() -> None:
     )
 
 
+def test_the_half_that_the_gyroscope_is_on_turns_before_the_joint_has_bent() -> None:
+    """By half the wheelbase over the speed: a loader's was .4 s ahead of its wheels, which were to be late. A later one is named."""
+    log, vehicle = drive(*MACHINES[0])
+    loader = Vehicle.from_dict({**vehicle.to_dict(), "articulated": True})
+    assert loader.wheelbase is not None
+    before = 0.5 * loader.wheelbase / float(np.nanquantile(log.channels["ground_speed"], 0.8))
+    ahead = later(log, ("angular_velocity_z",), -before)
+    assert lag_notes(ahead, vehicle)
+    assert lag_notes(ahead, loader) == []
+    (note,) = lag_notes(later(log, ("angular_velocity_z",), 2.3 * before), loader)
+    assert "behind the wheel speeds" in note
+
+
 @pytest.mark.parametrize("seed", [737, 1])
 def test_an_accelerometer_that_goes_with_the_ground_speed_is_not_late(seed: int) -> None:
     """Where a tractor pulls near the top of its curve, it follows its wheels .2 s late, and so do both sensors of its motion."""
