@@ -128,3 +128,14 @@ def test_torques_that_the_pull_leaves_nothing_of_are_in_doubt_with_it(tmp_path: 
     assert not any(
         "the units of both" in p.doubt for p in inspected(tmp_path, right, known=True).proposals.values()
     )
+
+
+@pytest.mark.parametrize("down", [True, False])
+def test_accelerations_of_a_frame_with_z_down_are_asked_for(tmp_path: Path, down: bool) -> None:
+    """An autopilot's IMU (x forward, y right, z down) was sure: 'the three sum up to gravity'."""
+    noise = 0.05 * np.random.default_rng(1).standard_normal((3, len(TIME)))
+    rest = {"x": 0.0, "y": 0.0, "z": -9.81 if down else 9.81}
+    imu = {f"IMU.Acc{a.upper()}": rest[a] + noise[k] for k, a in enumerate("xyz")}
+    found = inspected(tmp_path, drive() | imu, known=True).proposals
+    assert [bool(found[f"acceleration_{a}"].doubt) for a in "yz"] == [down, down]
+    assert ("z rests at -g" in found["acceleration_y"].doubt) is down

@@ -309,7 +309,7 @@ def test_speeds_that_are_measured_by_turns_are_compared_within_three_samples() -
         (
             "acceleration_z",
             -8.1,
-            "acceleration_z rests at -g: the axes point the other way (z up, specific force).",
+            "acceleration_z rests at -g: the axes point the other way (z up, specific force); y and the turns may, too.",
         ),
     ],
 )

@@ -15,6 +15,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
+from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY, factor_to
 
 if TYPE_CHECKING:
@@ -87,7 +88,16 @@ def gravity_warnings(recording: Recording) -> list[str]:
     if 0.9 < abs(rest) < 1.1:
         return ["acceleration_z rests at 1: the accelerations may be in g."]
     if rest < -8:
-        return ["acceleration_z rests at -g: the axes point the other way (z up, specific force)."]
+        sentence = "acceleration_z rests at -g: the axes point the other way (z up, specific force); y and the turns may, too."
+        channels = [n for n in ("acceleration_z", "acceleration_y") if n in recording.channels]
+        return [
+            WrongSign(
+                sentence,
+                channels,
+                "z rests at -g, as with z down and y to the right: 'sign: -1'?",
+                sure=False,
+            )
+        ]
     return []
 
 
