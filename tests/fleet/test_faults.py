@@ -47,7 +47,7 @@ def until(condition: Callable[[], object]) -> None:
 def at_work(place: Path, parent: int) -> list[psutil.Process]:
     """Descendants of a process that are writing estimates in this very moment."""
     if not [*(place / "out/.tmp").glob("terragrip-fleet-*")]:
-        return []  # asked fifty times a second: to look at all processes takes a fifth of a processor then
+        return []  # asked each 20 ms, of which to look at 87 processes takes 4
     busy = []
     for child in psutil.Process(parent).children(recursive=True):
         try:
