@@ -512,6 +512,11 @@ def test_a_unit_at_a_names_end_is_read_whole(name: str, unit: str) -> None:
     assert (proposal.unit, proposal.is_doubtful) == (unit, False)
 
 
+def test_a_torque_in_millinewton_metres_is_not_in_newton_metres() -> None:
+    """torque_rl_mNm was in N m, surely."""
+    assert _propose({"wheel_torque_rl_mNm": 2000 + SPEED})["drive_torque_rl"].unit == "mNm"
+
+
 @pytest.mark.parametrize(("name", "unit"), [("motor_current_{}_mA", None), ("motor_current_{}", "mA")])
 def test_the_constant_of_a_current_is_asked_for_in_its_unit(name: str, unit: str | None) -> None:
     """'in A; the scale in N m per A' was said of mA, of which torques were 1000 times as large."""
