@@ -230,7 +230,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
 void tgi_find_silent(tg_estimator *e, double time);
 void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real rate);
-void tgi_judge_leaps(tg_hold *h, const tg_real *rate, int32_t wheels, int32_t among, double time);
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const int32_t *axle, int32_t wheels, int32_t among, double time);
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 int32_t tgi_on_the_spot(const tg_estimator *e);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);

@@ -193,7 +193,7 @@ void tgi_doubt_speeds(tg_estimator *e, tg_row *row)
     const tg_real *const rate = e->constants.agility;
     const int32_t n = e->settings.machine.wheels;
     for (int32_t i = 0; i < n; i++) tgi_hold_update(e, &e->wheel[i], row, TG_WHEEL_SPEED + i, possible_rate(e, row, TG_WHEEL_SPEED + i));
-    tgi_judge_leaps(e->wheel, rate, n, n, row->time);
+    tgi_judge_leaps(e->wheel, rate, NULL, n, n, row->time);
     tgi_hold_update(e, &e->ground, row, TG_GROUND_SPEED, possible_rate(e, row, TG_GROUND_SPEED));
     for (int32_t i = 0; i <= n; i++) {
         const tg_hold *const h = i < n ? &e->wheel[i] : &e->ground;
