@@ -142,6 +142,7 @@ typedef struct { /* what follows from the settings alone */
     tg_real watched_share[8], work; /* wheel: its share of the load of those watched; their share of the driven wheels' */
     tg_real beyond[8][8];           /* wheel by wheel: what a value of the one adds to what no trend holds on the other, see warp.c */
     tg_real middle[8];              /* wheel: trend of the middle against the ends */
+    tg_real trend[2][8];            /* wheel: trends along and across, times its share of the load */
 } tgi_constants;
 
 struct tg_estimator {

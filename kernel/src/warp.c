@@ -37,6 +37,7 @@ static int32_t find_trends(const tg_settings *s, tgi_constants *c)
     }
     for (int32_t j = 0; j < n; j++) {
         c->middle[j] = count > kept ? trends[kept][j] : 0;
+        for (int32_t a = 0; a < 2; a++) c->trend[a][j] = kept == TG_TRENDS ? by_trend[1 + a][j] : 0;
         for (int32_t i = 0; i < n; i++) {
             c->beyond[j][i] = i == j;
             for (int32_t a = 0; a < kept; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
@@ -199,9 +200,10 @@ void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, t
     const tgi_constants *c = &e->constants;
     const tg_real *const slip = slips->straight;
     const tg_real gain = travelled / (e->settings.tuned.uneven_memory + travelled);
-    tg_real warp[TG_MAX_WHEELS], square = 0, pull = 0, all = 0;
+    tg_real warp[TG_MAX_WHEELS], square = 0, shown = 0, pull = 0, all = 0, trend[2] = {0};
     if (!flowing || !slips->known) {
         memset(w->slip, 0, sizeof w->slip);
+        memset(w->trend, 0, sizeof w->trend);
         return;
     }
     /* As noisy as a mean over slip_length, and as late. */
@@ -220,10 +222,19 @@ void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, t
         w->usual[i] += learned * beyond;
         w->slip[i] += weight * soon * (beyond - w->slip[i]);
         square += tgi_square(beyond);
+        shown += tgi_square(w->slip[i]);
+        for (int32_t a = 0; a < 2; a++) trend[a] += c->trend[a][i] * slip[i];
         pull += c->at_rest[i] * e->belief.x[i];
         w->wheel_slip[i] += fresh * (slips->along[i] - w->wheel_slip[i]);
     }
     w->square += counts * (square * c->share - w->square);
+    w->shown += counts * (shown * c->share - w->shown);
+    for (int32_t a = 0; a < 2; a++) {
+        const tg_real beyond = trend[a] - w->usual_trend[a];
+        w->usual_trend[a] += learned * beyond;
+        w->trend[a] += weight * soon * (beyond - w->trend[a]);
+        w->along_across[a] += counts * (tgi_square(w->trend[a]) - w->along_across[a]);
+    }
     w->noise += counts * (noise - w->noise);
     w->level += counts * (tgi_max(tgi_square(tgi_max(w->slipping, e->settings.tuned.least_slip)), square * c->share) - w->level);
     w->pulling += fresh * (pull - w->pulling);
@@ -240,6 +251,16 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh)
     for (int i = 0; i < TG_MAX_WHEELS && flowing; i++) w->adhesion[i] += fresh * (w->now[i] - w->adhesion[i]);
 }
 
+/* How far slips beyond the trends are loads', 0 to 1: a chassis shifts those alone. What wheels meet one by one, soft spots, their own lugs, a tread
+ * that yields, slips in passing, is as much along and across, of which hills and turns may add to one. Where the lesser is two thirds of what a
+ * pattern beyond the trends has, all may be load; where it is as much, nothing is. A wheel without power is at no such slip. */
+static tg_real shifted(const tgi_warped *w, const tgi_constants *c)
+{
+    const tg_real singly = c->slopes ? (tg_real)c->warps * (w->along_across[0] < w->along_across[1] ? w->along_across[0] : w->along_across[1]) : 0;
+    const tg_real part = w->shown > 0 ? 3 * (1 - singly / w->shown) : 1;
+    return part < 0 ? 0 : part < 1 ? part : 1;
+}
+
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
  * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
  * those slips relative to the wheels' slip in the same rows (at most 1), since a load moves a small slip by little and a large one by
@@ -249,7 +270,7 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
-    const tg_real explained = w->square > 0 ? k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
+    const tg_real explained = w->square > 0 ? shifted(w, &e->constants) * k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
     tg_real lasting = 0, farthest = 0;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
     const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * w->left;

@@ -60,6 +60,8 @@ typedef struct { /* wheels beyond all trends, see warp.c */
     tg_real level, sure;       /* mean square of the slip of all wheels; mean weight of a row in `usual` */
     tg_real pulling, slipping; /* adhesion and slip of all wheels, over the length of unevenness */
     tg_real left;              /* of a step in slip, where one wheel spins (left_by_spin) */
+    tg_real usual_trend[2], trend[2]; /* slip along and across as a rule, and beyond that low-passed as `slip` */
+    tg_real shown, along_across[2];   /* mean squares of `slip` and of these */
 } tgi_warped;
 
 typedef struct { /* driven wheels over a stretch of the way, beyond their usual: sums over `length` wheel radii, and at its end means, along and across */

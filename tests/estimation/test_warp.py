@@ -111,6 +111,19 @@ def test_a_diagonal_that_slips_more_is_higher_on_the_curve() -> None:
     assert 0.2 * secant < np.std(pattern) / np.std(slips) < 0.7 * secant
 
 
+def test_what_wheels_slip_one_by_one_is_no_load() -> None:
+    """On soft spots, or by a tyre that yields, each wheel slips for itself, as much along and across as by the diagonal: no chassis shifts
+    that. It counted as a diagonal's load, half of the secant."""
+    made = drive(120.0)
+    channels, radius = dict(made.recording.channels), np.arange(30)  # .3 s at .6 m/s
+    for k, wheel in enumerate(WHEELS):
+        drawn = np.random.default_rng(k).standard_normal(len(made.recording.time) + 29)
+        by = 0.02 * np.convolve(drawn, np.sin(np.pi * radius / 29), "valid") / np.sqrt(15)
+        channels[f"wheel_speed_{wheel}"] = channels[f"wheel_speed_{wheel}"] * (1 + by)
+    pattern, slips, secant = told(replace(made, recording=replace(made.recording, channels=channels)))
+    assert np.polyfit(slips, pattern, 1)[0] < 0.28 * secant
+
+
 def test_slips_that_differ_by_half_of_what_they_are_tell_of_the_load_as_small_differences_do() -> None:
     """Wheels that slip by .1 and .3 in place of .2, on 32 radii of way, do not spin: half of the secant, as of small ones."""
     made = slipping(drive(30.0, slip=lambda t: 0.2 + 0 * t), share=0.12, radii=32)
