@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from steady_drive import TIME, log
 from terragrip.estimation.noise import settings_in
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.rest import rest_warnings, torque_rest_warnings, turn_rest_warnings
+from terragrip.recording.rest import noise_at_rest, rest_warnings, torque_rest_warnings, turn_rest_warnings
 from terragrip.vehicle import Vehicle
 
 STOPS = (np.abs(TIME - 60) < 8) | (np.abs(TIME - 140) < 6)
@@ -56,6 +56,16 @@ def test_the_error_of_a_filtered_receiver_shows_where_the_wheels_stand(shift: fl
     noise = settings_in(stopping(shift, error), vehicle)[0]["ground_speed"]
     assert 0.025 < noise < 0.055
     assert settings_in(stopping(shift), vehicle)[0]["ground_speed"] < 0.015
+
+
+def test_where_the_vehicle_drives_by_its_ground_speed_no_noise_is_shown() -> None:
+    """Wheel speeds of 0 for 15 s of driving made it .95 m/s, of .02, where there was one true stop."""
+    time = np.arange(0, 200, 0.05)
+    speed = np.where((time > 50) & (time < 65), 0.0, 2 + 0.3 * np.sin(time / 3))
+    lost = np.where((time > 120) & (time < 135), 0.0, speed) / 0.3
+    noisy = speed + 0.02 * np.random.default_rng(0).standard_normal(len(time))
+    log = Recording(time, {"ground_speed": noisy, "wheel_speed_l": lost, "wheel_speed_r": lost})
+    assert noise_at_rest(log) == pytest.approx(0.02, rel=0.1)
 
 
 @pytest.mark.parametrize("zero", [0.03, -0.03, 0.002])

@@ -12,7 +12,7 @@ from terragrip.physics.loads import GRAVITY
 from terragrip.recording.once import once
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import rim_names
-from terragrip.recording.stretches import LONG, gaps
+from terragrip.recording.stretches import DRIVING, LONG, gaps
 from terragrip.recording.turns import filled_channel
 
 if TYPE_CHECKING:
@@ -55,9 +55,14 @@ def rest_warnings(recording: Recording) -> list[str]:
 
 def noise_at_rest(recording: Recording) -> float:
     """SD [m/s] of the ground speed where all wheels stand for long, in the usual stop; 0 where none shows it. It holds errors with memory,
-    as a receiver filters them, which fast changes do not show (`noise.white_noise`); a zero that is off everywhere does not count."""
+    as a receiver filters them, which fast changes do not show (`noise.white_noise`); a zero that is off everywhere does not count, nor a
+    stop in which the vehicle drives by it: the wheels' speeds are lost there, or it slides."""
     ground = recording.channels.get("ground_speed")
-    read = [] if ground is None else _read(ground, _stops(recording)[0])
+    if ground is None:
+        return 0.0
+    rows, still = _stops(recording)
+    most = DRIVING * _usual(ground, still)
+    read = [values for values in _read(ground, rows) if abs(np.mean(values)) <= most]
     if not read:
         return 0.0
     shift = _alike(read)
