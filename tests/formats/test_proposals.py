@@ -308,6 +308,15 @@ def test_a_rate_of_turn_that_follows_from_the_wheels_is_asked_for() -> None:
     assert not slips.doubt
 
 
+@pytest.mark.parametrize("name", ["/imu/data.angular_velocity.z", "angular_velocity_z", "yaw rate [rad/s]"])
+def test_a_gyroscope_on_firm_ground_is_not_asked_for(name: str) -> None:
+    """The rims' difference is its rate of turn there, to its noise: 'no gyroscope?' was asked of each."""
+    turn = np.sin(TIME / 4)
+    columns = {"wheel speed l [m/s]": SPEED - 0.3 * turn, "wheel speed r [m/s]": SPEED + 0.3 * turn}
+    read = turn + 0.003 * np.random.default_rng(0).standard_normal(len(TIME))
+    assert not _propose({**columns, name: read})["angular_velocity_z"].doubt
+
+
 def test_odometry_is_no_ground_speed() -> None:
     result = _propose({"odom_vx": SPEED, "gps_speed_mps": SPEED})
     assert result["ground_speed"].columns == ("gps_speed_mps",)

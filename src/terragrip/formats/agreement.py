@@ -65,7 +65,12 @@ class Agreement:
                 doubt = f"differs by {rest:.0%} from what the wheel speeds make of it: if a camera's or a lidar's, it is ground_speed?"
                 ranked["wheel_based_speed"][k] = replace(guess, confidence=0.4, doubt=doubt)
         for k, guess in enumerate(ranked.get("angular_velocity_z", ())):
-            rest = self._evidence.beyond(guess.column.column, rims) if len(rims) > 1 else None
+            name = guess.column.name
+            if len(rims) < 2 or not (
+                name.has("odometry") or "twist" in name.words
+            ):  # on firm ground a gyroscope's does, too
+                continue
+            rest = self._evidence.beyond(guess.column.column, rims)
             if rest is not None and rest < _NOT_OF_WHEELS:
                 doubt = "follows from the wheel speeds: no gyroscope?"
                 ranked["angular_velocity_z"][k] = replace(guess, confidence=0.4, doubt=doubt)
