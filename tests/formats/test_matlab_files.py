@@ -284,6 +284,16 @@ def test_our_own_estimates_are_no_log(tmp_path: Path) -> None:
             reader(tmp_path / "e.mat")
 
 
+@pytest.mark.parametrize("unit", [np.array(["km/h"], dtype=h5py.string_dtype()), np.array([b"km/h"])])
+def test_a_unit_may_be_an_array_of_one_text(tmp_path: Path, unit: np.ndarray) -> None:
+    """As netCDF's library writes a string: km/h were m/s without a word."""
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in {"time": TIME, **OURS}.items():
+            file.create_dataset(name, data=values)
+        file["ground_speed"].attrs["units"] = unit
+    assert read_table(tmp_path / "log.h5").units == {"ground_speed": "km/h"}
+
+
 @pytest.mark.parametrize(
     ("nested", "key"), [("", "units"), ("log/", "units"), ("", "unit"), ("log/", "Unit")]
 )

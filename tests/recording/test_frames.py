@@ -129,6 +129,21 @@ def test_units_that_attrs_state_otherwise_than_by_column_are_refused(attrs: dict
     Recording.from_frame(log)
 
 
+@pytest.mark.parametrize("empty", [None, {}, ""])
+def test_an_empty_entry_hides_no_units(empty: object) -> None:
+    """With attrs['units'] left empty those under 'unit' were dropped without a word."""
+    log = LOG.copy()
+    log.attrs = {"units": empty, "unit": {"ground_speed": "km/h"}}
+    np.testing.assert_allclose(Recording.from_frame(log)["ground_speed"], KMH / 3.6)
+
+
+def test_what_attrs_say_of_a_label_is_no_unit() -> None:
+    """A soil 'A' was refused as a current."""
+    log = LOG.assign(soil="A")
+    log.attrs = {"soil": "A", "units": []}
+    np.testing.assert_allclose(Recording.from_frame(log)["ground_speed"], KMH)
+
+
 def test_a_unit_of_another_quantity_is_refused() -> None:
     log = LOG.copy()
     log.attrs["units"] = {"ground_speed": "N"}

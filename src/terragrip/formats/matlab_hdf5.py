@@ -29,8 +29,10 @@ def tree_of(file: Any, h5py: Any) -> dict[str, Any]:
 
 
 def _with_units(group: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """A group's parts and, as a struct of units beside them, what the attributes ``units`` (or ``unit``) of its datasets state."""
+    """A group's parts and, as a struct of units beside them, what the attributes ``units`` (or ``unit``) of its datasets state, alone or as
+    an array of one text, as netCDF writes them."""
     stated = {name: stated_unit(group[name].attrs) for name in parts}
+    stated = {n: u.item() if isinstance(u, np.ndarray) and u.size == 1 else u for n, u in stated.items()}
     texts = {n: u.decode("utf-8", "replace") if isinstance(u, bytes) else u for n, u in stated.items()}
     # degrees_north; a netCDF's time is in "seconds since ..."
     units = {n: re.sub("_(north|east)$| since .*", "", u) for n, u in texts.items() if isinstance(u, str)}

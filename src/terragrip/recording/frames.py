@@ -114,8 +114,11 @@ def units_of_fields(schema: Any) -> dict[str, str]:
 
 
 def stated_unit(attributes: Mapping[Any, Any]) -> Any:
-    """What stands under ``units``, ``unit``, ``Units`` ... of a table's or a column's attributes; None if nothing."""
-    return next((attributes[k] for k in attributes if str(k).strip().lower() in ("unit", "units")), None)
+    """What stands under ``units``, ``unit``, ``Units`` ... of a table's or a column's attributes; None if nothing, or nothing in it."""
+    found = [attributes[k] for k in attributes if str(k).strip().lower() in ("unit", "units")]
+    return next(
+        (x for x in found if not isinstance(x, str | bytes | Mapping | list | tuple | None) or x), None
+    )
 
 
 def _beside(table: Any, source: str | None) -> dict[str, str]:
@@ -127,7 +130,8 @@ def _beside(table: Any, source: str | None) -> dict[str, str]:
         return units_of_fields(table.schema)
     attributes = getattr(table, "attrs", {})
     units = stated_unit(attributes)
-    stray = [name for name in getattr(table, "columns", ()) if is_common(str(attributes.get(name, " ")))]
+    channels = [name for name in getattr(table, "columns", ()) if unit_of(str(name)) is not None]
+    stray = [name for name in channels if is_common(str(attributes.get(name, " ")))]
     if stray or isinstance(units, list | tuple) or (isinstance(units, str) and is_common(units)):
         name, unit = (stray[0], attributes[stray[0]]) if stray else ("ground_speed", "km/h")
         raise InputError(
