@@ -110,3 +110,24 @@ def thinned(estimates: Estimates, every: int) -> Estimates:
         event_codes=estimates.event_codes[::every],
         labels={name: values[::every] for name, values in estimates.labels.items()},
     )
+
+
+def stopped(estimates: Estimates, at: float, seconds: float) -> Estimates:
+    """The same drive with a standstill of some seconds at a moment [s], in which nothing shows slip and adhesion."""
+    row, rows = int(at * RATE), int(seconds * RATE)
+
+    def held(values: np.ndarray, value: Any = None) -> np.ndarray:
+        return np.insert(values, row, np.full(rows, values[row] if value is None else value))
+
+    at_rest = {
+        n: 0.0 if n == "ground_speed" else np.nan
+        for n in estimates.columns
+        if n.startswith(("slip", "adhesion", "ground"))
+    }
+    return replace(
+        estimates,
+        time=np.arange(len(estimates) + rows) / RATE,
+        columns={n: held(v, at_rest.get(n)) for n, v in estimates.columns.items()},
+        event_codes=held(estimates.event_codes),
+        labels={n: held(v) for n, v in estimates.labels.items()},
+    )

@@ -198,8 +198,11 @@ def _change(
     weight /= weight.sum()
     middle, took = 0.5 * (steps.end[at - 1] + steps.start[at]), steps.end[at] - steps.end[at - 1]
     time = float((weight * middle).sum())
-    first, last = max(border - A_LENGTH // 2, 0), min(border + A_LENGTH // 2, len(steps) - 1)
-    way, seconds = (float(x[last] - x[first]) for x in (steps.travelled, steps.end))
+    near = slice(max(border - A_LENGTH // 2, 0), border + A_LENGTH // 2 + 1)
+    drives = (
+        steps.start[near][1:] <= steps.end[near][:-1]
+    )  # nothing is crossed between steps, where it stands
+    way, seconds = (float(np.diff(x[near])[drives].sum()) for x in (steps.travelled, steps.end))
     variance = (weight * ((middle - time) ** 2 + took**2 / 12)).sum() + crossing_variance(step, way, seconds)
     shift = {}
     for (name, sd), signal in zip(within.items(), cost.signal.T, strict=True):
