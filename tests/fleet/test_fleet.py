@@ -30,7 +30,7 @@ from terragrip.fleet.doubts import compared, unlike
 from terragrip.fleet.logs import FleetLog, fleet_logs, on_disk
 from terragrip.fleet.run import FleetResult
 from terragrip.fleet.store import Store
-from terragrip.fleet.tally import MEANS
+from terragrip.fleet.tally import MEANS, impossible
 from terragrip.fleet.task import Outcome, _attempt
 from terragrip.ground.analysis import analyse
 
@@ -173,6 +173,12 @@ def test_the_report_says_which_logs_are_in_doubt(place: Path, ran: Ran) -> None:
     assert summary["slip"].min() > 0
     assert (summary["left_out"] != "").sum() == 1
     assert "drive4.csv" not in set(pd.read_parquet(place / "out/soils.parquet")["log"])
+
+
+def test_a_way_downhill_without_a_pitch_is_named_as_a_cause() -> None:
+    """7 % downhill with the engine braking has true adhesion -.035 and resistance -.035: 'no machine has' that was said."""
+    row = dict.fromkeys(MEANS) | {"adhesion": -0.035, "soil_resistance": -0.035}
+    assert "but downhill where no pitch is in the log" in impossible(row)
 
 
 @pytest.mark.parametrize("mass", ["1 kg", "100 t"])

@@ -145,9 +145,15 @@ def impossible(row: Mapping[str, Any]) -> str:
         if row[name] is not None and not low <= row[name] <= high
     ]
     pushed = ("adhesion", "soil_resistance")  # alone the former is a way downhill, the latter a measured pull
+    where = ""
     if not wrong and all(row[name] is not None and row[name] < _PUSHED for name in pushed):
         wrong = [f"{name.replace('_', ' ')} {row[name]:.3g}" for name in pushed]
-    return f"no machine has a mean {' and '.join(wrong)}: check its vehicle file and units" if wrong else ""
+        where = ", but downhill where no pitch is in the log"
+    return (
+        f"no machine has a mean {' and '.join(wrong)}{where}: check its vehicle file and units"
+        if wrong
+        else ""
+    )
 
 
 def weighted(rows: Iterable[dict[str, Any]], name: str) -> tuple[float, float]:
