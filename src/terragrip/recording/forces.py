@@ -193,8 +193,8 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     """
     if courses is None or courses.thrust is None:
         return []
-    # of torques or a pull of another scale the other one shows what the load does
-    load = min(np.std(course) for course in (courses.thrust, courses.pull) if course is not None)
+    # of torques or a pull of another scale the other one shows what the load does; a cell that shows but noise does not
+    load = min(np.std(course) for course in (courses.thrust, courses.beside) if course is not None)
     if np.std(courses.rims) < _COMMANDED * load:
         return []
     # a receiver filters, and its speed is late
