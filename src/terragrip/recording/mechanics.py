@@ -15,6 +15,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.brake import braked
+from terragrip.recording.once import once
 from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.pulls import PULL, pull_warnings, silent_cell
 from terragrip.recording.ranks import median
@@ -73,7 +74,7 @@ class Fit:
         return low > _FACTOR or high < 1 / _FACTOR
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Means:
     """Windows of driving forward (n,): ``place`` of each row of the log among all, when these start (``starts`` [s]), which of them are
     used (``rows``), each ``length`` [s] long, and of the used ones the ``change`` of ground speed [m/s²], the ``speed`` [m/s],
@@ -87,7 +88,6 @@ class Means:
     climb: Floats | None = None
     length: float = _WINDOW
     thrusts: dict[str, Floats] = field(default_factory=dict)
-    made: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, repr=False)
 
     @property
     def count(self) -> int:
@@ -104,11 +104,10 @@ class Means:
         """All thrust less the drawbar force, over the mass (n,) [m/s²]."""
         return np.asarray(np.sum(list(self.thrusts.values()), axis=0))
 
+    @once
     def plain(self, values: Floats) -> Floats:
-        """A channel (rows,) as means over all windows, made once of each."""
-        if id(values) not in self.made:  # with the channel, so that its id stays its own
-            self.made[id(values)] = values, window_means(values, self.place, self.count)
-        return self.made[id(values)][1]
+        """A channel (rows,) as means over all windows."""
+        return window_means(values, self.place, self.count)
 
     def of(self, values: Floats) -> Floats:
         """A channel (rows,) as means over the stretch of ``change`` (n,)."""
