@@ -41,12 +41,14 @@ def inertial_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
         name: _lag(own, wheels, step, speed) if other is None or not _together(own, other, step) else 0.0
         for name, (own, wheels, other) in pairs.items()
     }
-    if vehicle.articulated and abs(lags.get("angular_velocity_z", 0.0)) <= (vehicle.wheelbase or 0.0) / speed:
-        # of one half, which turns as the joint bends, before the other's wheels do or after
-        lags.pop("angular_velocity_z", None)
     late = {name: seconds for name, seconds in lags.items() if seconds}
-    if late and np.ptp(list(late.values())) < 2.5 * step:  # of one sensor
+    if len(late) > 1 and np.ptp(list(late.values())) < 2.5 * step:  # of one sensor
         return [_sentence(float(np.mean(list(late.values()))), list(late))]
+    turn = late.get("angular_velocity_z", 0.0)
+    if turn and vehicle.articulated and abs(turn) <= (vehicle.wheelbase or 0.0) / speed:
+        del late[
+            "angular_velocity_z"
+        ]  # of one half, which turns before or after the other's wheels as the joint bends
     return [_sentence(seconds, [name]) for name, seconds in late.items()]
 
 
