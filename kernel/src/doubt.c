@@ -3,7 +3,6 @@
 
 #define TG_PEAK ((tg_real)2.4674)   /* (pi/2)^2: of a sine at half the sampling rate, its square over the one of its means over the steps */
 #define TG_LOCKING ((tg_real)0.05)  /* SD of an open differential's locking value S: its wheels have (1 +- S)/2 of the torque */
-#define TG_SAME 8                   /* samples alike in a row: two wheels' own torques, or speeds, are not */
 #define TG_USUAL ((tg_real)0.4)     /* what adhesion reaches on the prototype curve of the median soil (physics.md 5) */
 
 static int32_t counted(int32_t before, tg_real one, tg_real other)

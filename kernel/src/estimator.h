@@ -231,7 +231,7 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 int32_t tgi_ground_is_silent(const tg_estimator *e, double time);
 void tgi_find_silent(tg_estimator *e, double time);
 void tgi_hold_update(const tg_estimator *e, tg_hold *h, const tg_row *row, int32_t slot, tg_real rate);
-void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const int32_t *axle, int32_t wheels, int32_t among, double time);
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const tg_estimator *torques, int32_t wheels, int32_t among, double time);
 void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive);
 int32_t tgi_on_the_spot(const tg_estimator *e);
 void tgi_input_noise(const tg_estimator *e, const tg_drive *drive, tg_real dt, tg_row *row, tg_real *q);
@@ -264,6 +264,7 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
 
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */
+#define TG_SAME 8                   /* samples alike in a row: two wheels' own torques, or speeds, are not */
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_relative(const tg_estimator *e, tg_real square);

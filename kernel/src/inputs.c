@@ -84,9 +84,9 @@ static void believe_leap(tg_hold *h)
 }
 
 /* Of `among` inputs of the wheels, leaps of most at the same instant, one way and alike to a factor of two, are a manoeuvre, no spikes.
- * `rate`: what each is capable of in a second, where that is known. `axle`: of torques, those of the wheels of one axle suffice, which crosses
- * a border of soils alone, unless they leap to 0, as a lost message is read. */
-void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const int32_t *axle, int32_t wheels, int32_t among, double time)
+ * `rate`: what each is capable of in a second, where that is known. Of `torques`, given whose they are, those of the wheels of one axle
+ * suffice, which crosses a border of soils alone, unless they leap to 0, as a lost message is read, or are shares of one signal. */
+void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const tg_estimator *torques, int32_t wheels, int32_t among, double time)
 {
     tg_real leap[8];
     int32_t leaps = 0;
@@ -102,7 +102,7 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const int32_t *axle, int32
             const tg_real twice = 2 * leap[i] * leap[j];
             const int32_t like = twice > tgi_square(leap[i]) && twice > tgi_square(leap[j]);
             alike += like;
-            beside |= like && axle && j != i && axle[j] == axle[i];
+            beside |= like && torques && j != i && j == torques->constants.twin[i] && torques->shared[i] != TG_SAME;
         }
         if ((alike > 1 && 2 * alike > among) || (beside && h[i].raw != 0)) believe_leap(&h[i]);
     }
@@ -266,7 +266,7 @@ void tgi_update_inputs(tg_estimator *e, tg_row *row, tg_real dt, tg_drive *drive
         tgi_hold_update(e, &e->torque[i], row, TG_DRIVE_TORQUE + i, 0);
         driven++;
     }
-    tgi_judge_leaps(e->torque, NULL, s->wheel_axle, s->machine.wheels, driven, row->time);
+    tgi_judge_leaps(e->torque, NULL, e, s->machine.wheels, driven, row->time);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         if (!s->driven[i]) continue;
         const tg_hold *const h = &e->torque[i];

@@ -231,6 +231,17 @@ def test_torques_that_leap_as_most_others_or_their_axle_do_are_a_manoeuvre(
     assert max(moved) < 0.05
 
 
+@pytest.mark.parametrize(("other", "is_spike"), [(80.0, True), (75.0, False)])
+def test_both_halves_of_one_torque_of_an_axle_are_one_signal(other: float, is_spike: bool) -> None:
+    """Of a spike of it both wheels have the same, which was a border."""
+    log = drive(12.0).recording
+    front = 0.5 * (log["drive_torque_fl"] + log["drive_torque_fr"])
+    log = log.with_channels(drive_torque_fl=front, drive_torque_fr=front.copy())
+    for wheel, size in (("fl", 80.0), ("fr", other)):
+        log = with_values(log, f"drive_torque_{wheel}", 700, front[700] + size)
+    assert (run(log)["event"][700] == "outlier") == is_spike
+
+
 @pytest.mark.parametrize(("value", "is_lost"), [(0.0, True), (0.1, False)])
 def test_torques_of_an_axle_that_leap_to_0_are_lost(value: float, is_lost: bool) -> None:
     """As a lost message is read."""
