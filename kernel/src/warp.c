@@ -264,13 +264,14 @@ static tg_real shifted(const tgi_warped *w, const tgi_constants *c)
 /* The part of the adhesions beyond the trends that is not load (n,): a share of what lasts, which may be a rut or a hill; and what slips
  * show. Returns the relative variance of both: that of a guess between the two, and the curve's secant less what was explained, times
  * those slips relative to the wheels' slip in the same rows (at most 1), since a load moves a small slip by little and a large one by
- * much. */
+ * much; of both what may be load. */
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
 {
     const tgi_warped *w = &e->warped;
     const tg_tuned *k = &e->settings.tuned;
     const tg_real excess = tgi_max(w->square - w->noise, 0), inverse = 1 / tgi_max(w->slipping, k->least_slip);
-    const tg_real explained = w->square > 0 ? shifted(w, &e->constants) * k->bend * excess / w->square : 0, relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
+    const tg_real part = shifted(w, &e->constants), share = w->square > 0 ? excess / w->square : 0, explained = part * k->bend * share;
+    const tg_real relative = w->level > 0 ? tgi_sqrt(excess / w->level) : 0;
     tg_real lasting = 0, farthest = 0;
     for (int32_t i = 0; i < e->settings.machine.wheels; i++) farthest = tgi_max(farthest, tgi_fabs(w->slip[i]));
     const tg_real line = explained * inverse / beyond_line(k, farthest, inverse), slope = line * tgi_max(w->pulling, 0) * w->left;
@@ -278,6 +279,6 @@ tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp)
         warp[i] = k->lasting_share * w->adhesion[i] + slope * w->slip[i];
         lasting += tgi_square(w->adhesion[i]) * e->constants.share;
     }
-    const tg_real hidden = (k->bend_spread - explained) * relative;
+    const tg_real hidden = (part * k->bend_spread - explained) * relative;
     return k->lasting_share * (1 - k->lasting_share) * tgi_relative(e, lasting) + tgi_square(hidden);
 }
