@@ -209,6 +209,7 @@ void tgi_end_row(tg_estimator *e, const tg_row *row, tg_estimate *out);
 int32_t tgi_event_of(const tg_estimator *e, const tg_row *row, int32_t gap, int32_t lost);
 
 /* doubt.c */
+#define TG_SAME 8 /* samples alike in a row: two wheels' own torques, or speeds, are not */
 void tgi_watch_shares(tg_estimator *e, const tg_sample *sample);
 void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive);
 
@@ -264,7 +265,6 @@ void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes
 #define TG_LOAD_LENGTH ((tg_real)1.25)       /* wheel radii over which an unseen load is assumed to be correlated */
 
 #define TG_NOISE_SHARE ((tg_real)0.5)        /* of a filtered random walk's variance: noise that the estimate follows; the rest is its lag */
-#define TG_SAME 8                   /* samples alike in a row: two wheels' own torques, or speeds, are not */
 /* roughness.c; variance that unseen load adds to an adhesion */
 TG_INLINE tg_real tgi_rough_adhesion(const tgi_scene *scene, tg_real mu) { return scene->unseen_load * tgi_square(mu); }
 tg_real tgi_relative(const tg_estimator *e, tg_real square);

@@ -557,7 +557,7 @@ def test_torques_of_both_wheels_of_an_axle_leap_as_it_crosses_a_border_first():
         more[row:] = rng.uniform(-0.12, 0.12)
     by = {"f": more, "r": np.r_[0, more[:-1]]}  # the rear axle crosses it a row later
     load = {"f": 54 * 9.81 / 2, "r": 85 * 9.81 / 2}
-    log, truth = made.recording, {}
+    log = made.recording
     pull = log["drawbar_force"] + sum(load[w[0]] * by[w[0]] for w in WHEELS)
     torques = {f"drive_torque_{w}": log[f"drive_torque_{w}"] + 0.2 * load[w[0]] * by[w[0]] for w in WHEELS}
     truth = {w: made.truth[f"adhesion_{w}"] + by[w[0]] for w in WHEELS}

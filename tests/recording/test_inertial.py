@@ -91,11 +91,8 @@ def test_the_half_that_the_gyroscope_is_on_turns_before_the_joint_has_bent() -> 
     assert lag_notes(ahead, loader) == []
     (note,) = lag_notes(later(log, ("angular_velocity_z",), 2.3 * before), loader)
     assert "behind the wheel speeds" in note
-    both = (
-        "acceleration_x",
-        "angular_velocity_z",
-    )  # of one late IMU, whose gyroscope was left out of the note
-    (note,) = lag_notes(later(log, both, 0.5), loader)
+    # of one late IMU, whose gyroscope was left out of the note
+    (note,) = lag_notes(later(log, ("acceleration_x", "angular_velocity_z"), 0.5), loader)
     assert "acceleration_x and angular_velocity_z are 0.50 s behind" in note
 
 

@@ -139,21 +139,13 @@ def _mean_of(block: Estimates, name: str) -> Array:
 
 def impossible(row: Mapping[str, Any]) -> str:
     """The means of a log's row that no machine can have, with their values; empty if there are none."""
-    wrong = [
-        f"{name.replace('_', ' ')} {row[name]:.3g}"
-        for name, (low, high) in POSSIBLE.items()
-        if row[name] is not None and not low <= row[name] <= high
-    ]
-    pushed = ("adhesion", "soil_resistance")  # alone the former is a way downhill, the latter a measured pull
     where = ""
+    wrong = [n for n, (low, high) in POSSIBLE.items() if row[n] is not None and not low <= row[n] <= high]
+    pushed = ["adhesion", "soil_resistance"]  # alone the former is a way downhill, the latter a measured pull
     if not wrong and all(row[name] is not None and row[name] < _PUSHED for name in pushed):
-        wrong = [f"{name.replace('_', ' ')} {row[name]:.3g}" for name in pushed]
-        where = ", but downhill where no pitch is in the log"
-    return (
-        f"no machine has a mean {' and '.join(wrong)}{where}: check its vehicle file and units"
-        if wrong
-        else ""
-    )
+        where, wrong = ", but downhill where no pitch is in the log", pushed
+    values = " and ".join(f"{name.replace('_', ' ')} {row[name]:.3g}" for name in wrong)
+    return f"no machine has a mean {values}{where}: check its vehicle file and units" if wrong else ""
 
 
 def weighted(rows: Iterable[dict[str, Any]], name: str) -> tuple[float, float]:

@@ -66,9 +66,8 @@ class Agreement:
                 ranked["wheel_based_speed"][k] = replace(guess, confidence=0.4, doubt=doubt)
         for k, guess in enumerate(ranked.get("angular_velocity_z", ())):
             name = guess.column.name
-            if len(rims) < 2 or not (
-                name.has("odometry") or "twist" in name.words
-            ):  # on firm ground a gyroscope's does, too
+            # on firm ground a gyroscope's follows from them, too
+            if len(rims) < 2 or not (name.has("odometry") or "twist" in name.words):
                 continue
             rest = self._evidence.beyond(guess.column.column, rims)
             if rest is not None and rest < _NOT_OF_WHEELS:

@@ -199,9 +199,8 @@ def _change(
     middle, took = 0.5 * (steps.end[at - 1] + steps.start[at]), steps.end[at] - steps.end[at - 1]
     time = float((weight * middle).sum())
     near = slice(max(border - A_LENGTH // 2, 0), border + A_LENGTH // 2 + 1)
-    drives = (
-        steps.start[near][1:] <= steps.end[near][:-1]
-    )  # nothing is crossed between steps, where it stands
+    # nothing is crossed between steps, where it stands
+    drives = steps.start[near][1:] <= steps.end[near][:-1]
     way, seconds = (float(np.diff(x[near])[drives].sum()) for x in (steps.travelled, steps.end))
     variance = (weight * ((middle - time) ** 2 + took**2 / 12)).sum() + crossing_variance(step, way, seconds)
     shift = {}

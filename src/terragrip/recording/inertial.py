@@ -44,11 +44,10 @@ def inertial_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     late = {name: seconds for name, seconds in lags.items() if seconds}
     if len(late) > 1 and np.ptp(list(late.values())) < 2.5 * step:  # of one sensor
         return [_sentence(float(np.mean(list(late.values()))), list(late))]
-    turn = late.get("angular_velocity_z", 0.0)
-    if turn and vehicle.articulated and abs(turn) <= (vehicle.wheelbase or 0.0) / speed:
-        del late[
-            "angular_velocity_z"
-        ]  # of one half, which turns before or after the other's wheels as the joint bends
+    # of one half, which turns before or after the other's wheels as the joint bends
+    joint = (vehicle.wheelbase or 0.0) / speed if vehicle.articulated else 0.0
+    if abs(late.get("angular_velocity_z", np.inf)) <= joint:
+        del late["angular_velocity_z"]
     return [_sentence(seconds, [name]) for name, seconds in late.items()]
 
 

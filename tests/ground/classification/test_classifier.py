@@ -234,10 +234,8 @@ def test_the_same_seed_gives_the_same_classifier_and_scikit_learn_can_clone_it(h
     second = clone(first)
     assert second.get_params() == first.get_params()
     tables, labels = drives(range(1000, 1002), seconds=20.0)
-    learnt, shown = (
-        without(tables, *BODY),
-        without(held_out[0], *BODY),
-    )  # by single wheels: these are what forests judge
+    # by single wheels: these are what forests judge
+    learnt, shown = without(tables, *BODY), without(held_out[0], *BODY)
     a = first.fit(learnt, labels).predict_proba(shown)
     assert np.array_equal(a, second.fit(learnt, labels).predict_proba(shown))
     assert first.n_features_in_ == len(first.feature_names_in_)
