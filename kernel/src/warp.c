@@ -8,6 +8,7 @@
 
 #define TG_TRENDS 3 /* equal, along, across; in a turn also the middle against the ends */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
+#define TG_SINGLY ((tg_real)3) /* within a third below what wheels slip one by one, less and less of a pattern is load (`shifted`) */
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what the first three leave. More wheels than
  * those leave patterns. */
 static int32_t find_trends(const tg_settings *s, tgi_constants *c)
@@ -257,7 +258,7 @@ void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh)
 static tg_real shifted(const tgi_warped *w, const tgi_constants *c)
 {
     const tg_real singly = c->slopes ? (tg_real)c->warps * (w->along_across[0] < w->along_across[1] ? w->along_across[0] : w->along_across[1]) : 0;
-    const tg_real part = w->shown > 0 ? 3 * (1 - singly / w->shown) : 1;
+    const tg_real part = w->shown > 0 ? TG_SINGLY * (1 - singly / w->shown) : 1;
     return part < 0 ? 0 : part < 1 ? part : 1;
 }
 
