@@ -286,3 +286,50 @@ def test_the_page_on_the_vehicle_file_holds_a_file_that_loads_and_names_every_ke
     named = set(re.findall(r"\w+", page))
     for part in (Vehicle, Axle, Wheel, Sensors, Uncertainty, Calibration):
         assert named.issuperset(part.model_fields), part
+
+
+@pytest.mark.parametrize(
+    ("front", "rear", "whole", "wanted"),
+    [
+        ({}, {}, {}, [False, False]),
+        ({"steered": True}, {}, {}, [True, False]),
+        ({"steered": True, "pivots": False}, {}, {}, [False, False]),
+        ({"steered": True}, {"steered": True}, {}, [False, False]),
+        ({}, {}, {"articulated": True}, [False, True]),
+        ({"pivots": True}, {"pivots": False}, {"articulated": True}, [True, False]),
+    ],
+)
+def test_an_axle_that_steers_and_the_last_of_a_machine_that_bends_pivot_unless_the_file_says_no(
+    front: dict[str, Any], rear: dict[str, Any], whole: dict[str, Any], wanted: list[bool]
+) -> None:
+    data = yaml.safe_load(GOOD) | whole
+    data["axles"]["front"] |= front
+    data["axles"]["rear"] |= rear
+    assert Vehicle.from_dict(data).pivoting.tolist() == wanted
+
+
+def test_a_body_that_no_axle_keeps_upright_is_refused() -> None:
+    data = yaml.safe_load(GOOD)
+    for axle in data["axles"].values():
+        axle["pivots"] = True
+    with pytest.raises(InputError, match=r"axles.front.pivots.*no axle keeps the body from rolling"):
+        Vehicle.from_dict(data)
+
+
+def test_a_lateral_force_on_an_axle_on_a_pin_is_held_by_the_other() -> None:
+    """By the file's words alone: where they say nothing, each axle holds its own part of the roll."""
+    data = yaml.safe_load(GOOD)
+    rigid = Vehicle.from_dict(data).wheel_shares[1]
+    data["axles"]["front"]["pivots"] = True
+    _, leaning = Vehicle.from_dict(data).wheel_shares
+    assert leaning[0] == pytest.approx(rigid[0] * 0.20 / 0.30)
+    assert 85 * (leaning[2] - rigid[2]) == pytest.approx(54 * (rigid[0] - leaning[0]))
+
+
+def test_vehicles_that_were_used_compare_by_what_their_files_say() -> None:
+    """Arrays that their properties keep made `==` raise ValueError."""
+    one, other, third = (Vehicle.from_dict(yaml.safe_load(GOOD) | more) for more in ({}, {}, {"track": 0.6}))
+    for vehicle in (one, other, third):
+        assert vehicle.wheel_radius.size == 2 * vehicle.axle_mass.size
+    assert one == other
+    assert one != third

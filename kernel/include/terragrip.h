@@ -365,6 +365,7 @@ typedef struct {
     int32_t towing;                 /* 1: a drawbar force is measured, so it is unknown until its first value; 0: none until then */
     int32_t weighed, carrying;      /* 1: mass, vertical hitch load are measured, likewise; 0: they are never used */
     int32_t articulated;            /* 1: it bends at a joint between axles, so that each has a rate of turn of its own */
+    int32_t pivots[8];              /* axle: 1: it swings on a pin in its middle, so that its wheels carry alike */
     int32_t wheel_axle[8];          /* which axle a wheel is on */
     int32_t driven[8];              /* 0: its torque is 0 */
     int32_t powered[8];             /* 1: a motor drives it, so the watch looks at it; of no wheel: at all. A driven wheel may be merely measured */

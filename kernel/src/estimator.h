@@ -281,6 +281,7 @@ tg_real tgi_by_load(const tg_estimator *e, tg_real scatter);
 /* warp.c */
 tgi_slips tgi_driven_slips(const tg_estimator *e);
 void tgi_place_trends(const tg_settings *s, tgi_constants *c);
+int32_t tgi_pivot(const tg_settings *s, tg_real *value);
 void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg_real *restrict warp);
 void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh);
 void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled);

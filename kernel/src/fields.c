@@ -25,7 +25,7 @@ static const tgi_field tuning[] = {ANY(T, engine), ANY(T, policy), REALS(T, walk
 #undef T
 #define T tg_settings
 const tgi_field tgi_settings_fields[] = {
-    ANY(T, method), ANY(T, axles), ANY(T, towing), ANY(T, weighed), ANY(T, carrying), ANY(T, articulated), ANY(T, wheel_axle), ANY(T, driven), ANY(T, powered),
+    ANY(T, method), ANY(T, axles), ANY(T, towing), ANY(T, weighed), ANY(T, carrying), ANY(T, articulated), ANY(T, pivots), ANY(T, wheel_axle), ANY(T, driven), ANY(T, powered),
     INSIDE(T, machine, tg_machine, machine), INSIDE(T, tuning, tg_tuning, tuning), REALS(T, load_share), REALS(T, load_transfer),
     REALS(T, payload_share), REALS(T, payload_height), REALS(T, hitch_share),
     REALS(T, wheel_share), REALS(T, wheel_side), REALS(T, wheel_ahead), REALS(T, receiver_ahead), REALS(T, receiver_side), REALS(T, lateral_share), REALS(T, center_of_gravity_height), REALS(T, hitch_height),

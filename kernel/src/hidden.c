@@ -9,8 +9,9 @@
 #define TG_BEYOND_CHANCE ((tg_real)2) /* SDs */
 
 /* Leave of a value of the driven wheels (8,) what is neither their mean nor beyond all trends. */
-static void leave_trends(const tgi_constants *c, tg_real *value)
+static void leave_trends(const tg_settings *s, const tgi_constants *c, tg_real *value)
 {
+    tgi_pivot(s, value);
     tg_real warp[TG_MAX_WHEELS], mean = 0;
     tgi_warp(c, value, warp);
     for (int32_t i = 0; i < TG_MAX_WHEELS; i++) {
@@ -72,8 +73,8 @@ static void end_stretch(tg_estimator *e)
         now->adhesion[i] /= now->length;
         now->slip[i] /= now->length;
     }
-    leave_trends(&e->constants, now->adhesion);
-    leave_trends(&e->constants, now->slip);
+    leave_trends(&e->settings, &e->constants, now->adhesion);
+    leave_trends(&e->settings, &e->constants, now->slip);
     const tg_real near = (now->length + last->length) / 2, far = near + (last->length + older->length) / 2, apart = 2 * e->settings.tuned.slip_length;
     const tgi_stretch *const before = near >= apart ? last : older;
     const tg_real away = near >= apart ? near : far;

@@ -3,7 +3,7 @@
  * against its range. */
 #include "fields.h"
 
-#define TG_SNAPSHOT_VERSION 41u
+#define TG_SNAPSHOT_VERSION 42u
 
 typedef struct {
     char magic[8];

@@ -9,8 +9,26 @@
 #define TG_TRENDS 3 /* equal, along, across; in a turn also the middle against the ends */
 #define TG_IN_LINE ((tg_real)1e-9) /* mean square below which a trend is none: all wheels on one axle, or on one side */
 #define TG_SINGLY ((tg_real)3) /* within a third below what wheels slip one by one, less and less of a pattern is load (`shifted`) */
+/* Of values on the wheels (8,) what loads can do: those on an axle that pivots are alike. Returns how many patterns that takes away. */
+int32_t tgi_pivot(const tg_settings *s, tg_real *value)
+{
+    int32_t away = 0;
+    for (int32_t k = 0; k < s->axles; k++) {
+        tg_real mean = 0;
+        int32_t count = 0;
+        for (int32_t i = 0; i < s->machine.wheels && s->pivots[k]; i++) {
+            if (s->wheel_axle[i] != k || !s->driven[i]) continue;
+            mean += (value[i] - mean) / (tg_real)++count;
+        }
+        for (int32_t i = 0; i < s->machine.wheels && count; i++)
+            if (s->wheel_axle[i] == k && s->driven[i]) value[i] = mean;
+        away += count ? count - 1 : 0;
+    }
+    return away;
+}
+
 /* Trends over the driven wheels, orthonormal under their loads at rest (Gram and Schmidt), and what the first three leave. More wheels than
- * those leave patterns. */
+ * those leave patterns, but for what a pivot makes alike. Returns the number of trends. */
 static int32_t find_trends(const tg_settings *s, tgi_constants *c)
 {
     const int32_t n = s->machine.wheels;
@@ -23,6 +41,7 @@ static int32_t find_trends(const tg_settings *s, tgi_constants *c)
             const tg_real along = longest > 0 ? s->load_transfer[s->wheel_axle[i]] / longest : 0;
             trend[i] = a == 0 ? 1 : a == 1 ? along : a == 2 ? (tg_real)c->side[i] : along * along;
         }
+        tgi_pivot(s, trend);
         for (int32_t b = 0; b < count; b++) {
             tg_real share = 0;
             for (int32_t i = 0; i < n; i++) share += by_trend[b][i] * trend[i];
@@ -39,8 +58,10 @@ static int32_t find_trends(const tg_settings *s, tgi_constants *c)
     for (int32_t j = 0; j < n; j++) {
         c->middle[j] = count > kept ? trends[kept][j] : 0;
         for (int32_t a = 0; a < 2; a++) c->trend[a][j] = kept == TG_TRENDS ? by_trend[1 + a][j] : 0;
+        memset(c->beyond[j], 0, sizeof c->beyond[j]);
+        c->beyond[j][j] = 1;
+        tgi_pivot(s, c->beyond[j]);
         for (int32_t i = 0; i < n; i++) {
-            c->beyond[j][i] = i == j;
             for (int32_t a = 0; a < kept; a++) c->beyond[j][i] -= by_trend[a][j] * trends[a][i];
             c->beyond[j][i] *= c->pulls[i];
         }
@@ -70,7 +91,8 @@ void tgi_place_trends(const tg_settings *s, tgi_constants *c)
     for (int32_t i = 0; i < n && work > 0; i++) c->watched_share[i] /= work;
     if (work > 0) c->work = work;
     const int32_t count = find_trends(s, c);
-    c->warps = driven - count;
+    tg_real alike[TG_MAX_WHEELS] = {0};
+    c->warps = driven - count - tgi_pivot(s, alike);
     c->slopes = count > 1 && !(unpowered && c->warps) ? count - 1 : 0; /* see hidden.c */
     c->share = 1 / (tg_real)driven;
 }

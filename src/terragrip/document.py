@@ -59,6 +59,12 @@ class Part(BaseModel):
 
         __init__.__pydantic_base_init__ = True  # pydantic's name for one that `model_validate` need not call
 
+    def __eq__(self, other: object) -> bool:
+        """By fields: what properties keep, arrays among it, is no part of the document, and no array has one truth."""
+        return type(self) is type(other) and all(
+            getattr(self, k) == getattr(other, k) for k in type(self).model_fields
+        )
+
     def __setattr__(self, name: str, value: Any) -> None:
         hint = "change the file, or what to_dict() gives, and make another with from_dict(data)"
         raise InputError("cannot be changed", place=name, hint=hint)

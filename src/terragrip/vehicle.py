@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.document import Fault, Part, read_yaml, validate
 from terragrip.errors import InputError
-from terragrip.physics.loads import axle_loads, point_load_shares
+from terragrip.physics.loads import axle_loads, point_load_shares, wheel_shares
 from terragrip.vehicle_parts import (
     NAME,
     Antenna,
@@ -39,6 +39,9 @@ from terragrip.vehicle_parts import (
     Uncertainty,
     Wheel,
     Width,
+    check_pivots,
+    check_places,
+    pivoting_axles,
     quantity_of,
 )
 
@@ -142,6 +145,7 @@ class Vehicle(Part):
                 raise Fault(f"the wheel {twice} occurs twice", hint, ("axles", key, "wheels"))
             if axle.wheel is None and some_know and not self.knows_wheels:
                 raise Fault("has no wheel data, and another axle has", _ADD_WHEELS, ("axles", key))
+        check_pivots(self.axles)
         carried = sum(axle.mass for axle in self.axles.values())
         if abs(carried - self.mass) > _MASS_TOLERANCE * self.mass:
             raise Fault(
@@ -165,25 +169,7 @@ class Vehicle(Part):
         for key in ("wheelbase", "center_of_gravity_height") if len(self.axles) > 1 else ():
             if getattr(self, key) is None or key not in self.model_fields_set:
                 raise Fault("is missing", f"two or more axles need it: add e.g. '{key}: 0.6 m'", (key,))
-        placed = [name for name, axle in self.axles.items() if axle.x is not None]
-        if placed:
-            self._check_places(placed)
-
-    def _check_places(self, placed: list[str]) -> None:
-        """Places of axles: those between the first and the last have all one or none, and none is ahead of one before it."""
-        between = list(self.axles)[1:-1]
-        missing = next((name for name in between if name not in placed), None)
-        if missing is not None:
-            hint = "give it for every axle between the first and the last, or for none: then they are evenly spaced"
-            raise Fault("is missing", hint, ("axles", missing, "x"))
-        place, length = self.axle_to_rear, self.wheelbase or 0.0
-        for k, name, right in ((0, next(iter(self.axles)), length), (-1, list(self.axles)[-1], 0.0)):
-            if abs(place[k] - right) > 1e-6:
-                hint = f"the first axle is the wheelbase, {length:g} m, ahead of the last, and that is at 0: leave x out there"
-                raise Fault(f"is {place[k]:g} m", hint, ("axles", name, "x"))
-        if np.any(np.diff(place) > 0):
-            name = list(self.axles)[int(np.argmax(np.diff(place) > 0)) + 1]
-            raise Fault("is ahead of the axle before it", "list axles front to rear", ("axles", name, "x"))
+        check_places(self.axles, self.axle_to_rear, self.wheelbase or 0.0)
 
     @cached_property
     def wheels(self) -> tuple[str, ...]:
@@ -321,6 +307,25 @@ class Vehicle(Part):
     def center_of_gravity_to_rear(self) -> float:
         """Distance of the centre of gravity to the rear axle [m], from the axles' masses; 0 with one axle."""
         return float(self.axle_mass @ self.axle_to_rear / self.axle_mass.sum())
+
+    @cached_property
+    def pivoting(self) -> Bools:
+        """Whether each axle swings on a pin (axles,), see `terragrip.vehicle_parts.pivoting_axles`."""
+        return _frozen(np.array(pivoting_axles(self.axles, self.articulated)))
+
+    @cached_property
+    def wheel_shares(self) -> tuple[Floats, Floats]:
+        """Of every wheel (n,): its share of its axle's load, and what it loses of that per m/s² to the left [s²/m], by
+        `terragrip.physics.loads.wheel_shares`. An axle that pivots does so at the height of its wheels' middle."""
+        wheels = [axle.wheel or self.wheel for axle in self.axles.values()]
+        pins = [wheel.radius if wheel else 0.0 for wheel in wheels]
+        return wheel_shares(
+            [len(axle.wheels) for axle in self.axles.values()],
+            center_of_gravity_height=self.center_of_gravity_height,
+            track=self.track,
+            axle_mass=self.axle_mass,
+            pins={k: pins[k] for k, axle in enumerate(self.axles.values()) if axle.pivots},
+        )
 
     @cached_property
     def payload_share(self) -> Floats:

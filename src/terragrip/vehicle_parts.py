@@ -7,8 +7,10 @@ import re
 from collections.abc import Callable, Collection
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, field_validator, model_validator
 
+from terragrip.arrays import Floats
 from terragrip.document import Fault, Part
 from terragrip.tire_size import tire_size
 from terragrip.units import UnitError, factor_to, quantity
@@ -162,6 +164,8 @@ class Wheel(Part):
 class Axle(Part):
     """An axle: the mass it carries at rest on level ground [kg], its wheels' names, whether it is driven, and whether it steers.
 
+    ``pivots``: it swings on a pin in its middle, as a tractor's front axle does, so that its wheels carry alike on uneven ground.
+    None: not said, see `pivoting_axles`.
     ``x`` [m]: how far ahead of the last axle its load acts; of a bogie's two axles where that is pivoted.
     ``bearing_resistance`` [N s/rad] and ``drive_friction`` [N m]: of each of its wheels, where they are others than the vehicle's.
     """
@@ -171,6 +175,7 @@ class Axle(Part):
     wheel: Wheel | None = None
     driven: bool = True
     steered: bool = False
+    pivots: bool | None = None
     x: Annotated[float, *quantity_of("m", 0, 30, likely=_LENGTHS)] | None = None
     bearing_resistance: Bearing | None = None
     drive_friction: Friction | None = None
@@ -181,6 +186,48 @@ class Axle(Part):
         if not isinstance(value, list | tuple) or not value:
             raise Fault("is not a list of wheels", "write e.g. '[fl, fr]'")
         return tuple(_wheel_name(name) for name in value)
+
+
+def check_pivots(axles: dict[str, Axle]) -> None:
+    """Raise a Fault where every axle with two wheels or more pivots."""
+    pivots = [key for key, axle in axles.items() if axle.pivots]
+    if pivots and all(axle.pivots or len(axle.wheels) == 1 for axle in axles.values()):
+        hint = "leave out 'pivots' for an axle that the body rests on, left and right"
+        raise Fault("no axle keeps the body from rolling over", hint, ("axles", pivots[0], "pivots"))
+
+
+def pivoting_axles(axles: dict[str, Axle], articulated: bool) -> list[bool]:
+    """Whether each axle swings on a pin. Where the file does not say it: as most machines do, one that steers beside one that does not,
+    and the last of an ``articulated`` machine (docs/decisions/0176)."""
+    rigid = all(axle.steered for axle in axles.values())
+    last = list(axles)[-1] if articulated else None
+    return [
+        (axle.steered and not rigid) or key == last if axle.pivots is None else axle.pivots
+        for key, axle in axles.items()
+    ]
+
+
+def check_places(axles: dict[str, Axle], place: Floats, length: float) -> None:
+    """Raise a Fault unless the axles between the first and the last all have an ``x`` or none, and none is ahead of one before it.
+
+    ``place`` (axles,) [m] ahead of the last axle; ``length`` [m]: the wheelbase.
+    """
+    placed = [name for name, axle in axles.items() if axle.x is not None]
+    if not placed:
+        return
+    missing = next((name for name in list(axles)[1:-1] if name not in placed), None)
+    if missing is not None:
+        hint = (
+            "give it for every axle between the first and the last, or for none: then they are evenly spaced"
+        )
+        raise Fault("is missing", hint, ("axles", missing, "x"))
+    for k, name, right in ((0, next(iter(axles)), length), (-1, list(axles)[-1], 0.0)):
+        if abs(place[k] - right) > 1e-6:
+            hint = f"the first axle is the wheelbase, {length:g} m, ahead of the last, and that is at 0: leave x out there"
+            raise Fault(f"is {place[k]:g} m", hint, ("axles", name, "x"))
+    if np.any(np.diff(place) > 0):
+        name = list(axles)[int(np.argmax(np.diff(place) > 0)) + 1]
+        raise Fault("is ahead of the axle before it", "list axles front to rear", ("axles", name, "x"))
 
 
 def _wheel_name(name: Any) -> str:

@@ -137,9 +137,24 @@ def test_levers_add_no_weight_and_one_moment(position):
 
 def test_wheel_shares_are_lateral_shares_of_every_axle():
     given = {"center_of_gravity_height": 0.4, "track": 1.2}
-    level, leaning = wheel_shares([1, 2, 3], **given)
-    wanted = np.concatenate([lateral_shares(n, -1.7, **given) for n in (1, 2, 3)])
+    level, leaning = wheel_shares([2, 3], axle_mass=[30.0, 70.0], **given)
+    wanted = np.concatenate([lateral_shares(n, -1.7, **given) for n in (2, 3)])
     np.testing.assert_allclose(level + 1.7 * leaning, wanted, rtol=1e-14)
-    unknown, none = wheel_shares([2], center_of_gravity_height=0.4, track=None)
+    unknown, none = wheel_shares([2], center_of_gravity_height=0.4, track=None, axle_mass=[9.0])
     assert unknown.tolist() == [0.5, 0.5]
     assert none.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("wheels", "pins", "front"),
+    [([2, 2], {}, 30.0 * 0.9), ([2, 2], {0: 0.5}, 30.0 * 0.5), ([1, 2], {}, 0.0), ([2, 2], {0: 0.0}, 0.0)],
+)
+def test_what_an_axle_on_a_pin_leaves_of_a_roll_the_others_hold(wheels, pins, front):
+    """About the ground the loads hold the moment of the whole mass, 100 kg at .9 m; a pin passes on what acts above it."""
+    _, leaning = wheel_shares(
+        wheels, center_of_gravity_height=0.9, track=1.6, axle_mass=[30.0, 70.0], pins=pins
+    )
+    left = np.concatenate([np.linspace(0.8, -0.8, n) if n > 1 else np.zeros(1) for n in wheels])
+    moment = leaning * left * GRAVITY * np.repeat([30.0, 70.0], wheels)
+    assert moment[: wheels[0]].sum() == pytest.approx(front, abs=1e-12)
+    assert moment.sum() == pytest.approx(100.0 * 0.9)

@@ -14,7 +14,7 @@ from terragrip.arrays import Floats
 from terragrip.errors import InputError
 from terragrip.estimation.methods import Method
 from terragrip.estimation.noise import DELAY, is_positive
-from terragrip.physics.loads import GRAVITY, load_levers, wheel_shares
+from terragrip.physics.loads import GRAVITY, load_levers
 from terragrip.physics.radius import biderman_deflection, hadekel_deflection, loaded_radius, rolling_radius
 from terragrip.recording.checks import require_hitch
 from terragrip.vehicle import Vehicle
@@ -181,6 +181,7 @@ def put_axles(settings: Any, vehicle: Vehicle) -> None:
     settings.axles, settings.articulated = len(vehicle.axle_names), vehicle.articulated
     settings.receiver_ahead, settings.receiver_side = vehicle.receiver
     for k in range(len(mass)):
+        settings.pivots[k] = bool(vehicle.pivoting[k])
         settings.load_share[k] = mass[k] / mass.sum()
         settings.load_transfer[k] = levers[k]
 
@@ -192,11 +193,7 @@ def _set_loads(settings: Any, vehicle: Vehicle) -> None:
     settings.payload_height = vehicle.payload_height
     for k in range(len(vehicle.axle_names)):
         settings.payload_share[k], settings.hitch_share[k] = vehicle.payload_share[k], vehicle.hitch_share[k]
-    level, leaning = wheel_shares(
-        [len(axle.wheels) for axle in vehicle.axles.values()],
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        track=vehicle.track,
-    )
+    level, leaning = vehicle.wheel_shares
     for i, side in enumerate(vehicle.wheel_side):
         settings.wheel_share[i], settings.lateral_share[i] = level[i], leaning[i]
         settings.wheel_side[i], settings.wheel_ahead[i] = side, vehicle.wheel_ahead[i]

@@ -6,7 +6,7 @@ one, replaces these formulas.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -110,21 +110,32 @@ def load_levers(axle_position: ArrayLike) -> NDArray[Any]:
 
 
 def wheel_shares(
-    wheels: Sequence[int], *, center_of_gravity_height: float, track: float | None, gravity: float = GRAVITY
+    wheels: Sequence[int],
+    *,
+    center_of_gravity_height: float,
+    track: float | None,
+    axle_mass: ArrayLike,
+    pins: Mapping[int, float] | None = None,
+    gravity: float = GRAVITY,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Of every wheel (n,): its share of its axle's load, and what it loses of that per m/s² to the left [s²/m].
 
     ``wheels``: how many each axle has, front to rear. ``track`` [m]; None: nothing is known of the sides, no share changes.
-    So that a load is axle_load (share - lateral a_y), as :func:`lateral_shares` has it.
+    So that a load is axle_load (share - lateral a_y), as :func:`lateral_shares` has it. ``pins``: by an axle's index the height [m] of
+    the pin on which it pivots; it holds the moment of what it carries (``axle_mass`` (axles,) [kg]) from there down, an axle of one wheel
+    none, and the other axles the rest (physics.md 3).
     """
     level = np.concatenate([np.full(count, 1 / count) for count in wheels])
     if track is None:
         return level, np.zeros_like(level)
+    mass = np.asarray(axle_mass, dtype=float)
+    own = {k: 0.0 for k, count in enumerate(wheels) if count == 1} | dict(pins or {})
+    rigid = np.array([k not in own for k in range(len(wheels))])
+    rest = sum(mass[k] * (center_of_gravity_height - height) for k, height in own.items())
+    held = center_of_gravity_height + (rest / mass[rigid].sum() if rigid.any() else 0.0)
     leaning = [
-        lateral_shares(
-            count, 1.0, center_of_gravity_height=center_of_gravity_height, track=track, gravity=gravity
-        )
-        for count in wheels
+        lateral_shares(count, 1.0, center_of_gravity_height=own.get(k, held), track=track, gravity=gravity)
+        for k, count in enumerate(wheels)
     ]
     return level, level - np.concatenate(leaning)
 

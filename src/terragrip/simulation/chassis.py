@@ -20,7 +20,10 @@ def warp_stiffness(vehicle: Vehicle, torsion: float) -> Floats:
     ``torsion`` is the force at each wheel of a two-axle, four-wheel chassis per metre of one diagonal over the other.
     """
     ahead = vehicle.axle_to_rear[vehicle.wheel_axle]
-    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), vehicle.wheel_side], axis=1)
+    swings = [
+        np.where(vehicle.wheel_axle == k, vehicle.wheel_side, 0.0) for k in np.flatnonzero(vehicle.pivoting)
+    ]
+    rigid = np.stack([np.ones(len(ahead)), ahead - ahead.mean(), vehicle.wheel_side, *swings], axis=1)
     return 4.0 * torsion * (np.eye(len(ahead)) - rigid @ np.linalg.pinv(rigid))
 
 

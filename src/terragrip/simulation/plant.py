@@ -9,7 +9,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.errors import InputError
-from terragrip.physics.loads import load_levers, wheel_shares
+from terragrip.physics.loads import load_levers
 from terragrip.simulation.chassis import warp_stiffness
 from terragrip.simulation.scenario import Scenario
 from terragrip.simulation.terrain import CURVE_INTERVALS, Terrain
@@ -153,11 +153,7 @@ def _machine(ffi: Any, lib: Any, scenario: Scenario, vehicle: Vehicle, radius: F
         machine.axle_position[a], machine.axle_share[a] = float(vehicle.axle_to_rear[a]), float(share)
         machine.axle_lever[a] = float(levers[a])
     sides = vehicle.wheel_side
-    level, leaning = wheel_shares(
-        [len(axle.wheels) for axle in vehicle.axles.values()],
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        track=vehicle.track,
-    )
+    level, leaning = vehicle.wheel_shares
     machine.steers = int(scenario.robot.steers)
     for i, row in enumerate(warp_stiffness(vehicle, scenario.robot.chassis_torsion)):
         for j, value in enumerate(row):

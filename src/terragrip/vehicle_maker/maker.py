@@ -173,7 +173,7 @@ def _tree(machine: MachineClass, values: Mapping[str, float], name: str) -> dict
     axles = {}
     for (key, own), load in zip(machine.axles.items(), masses, strict=True):
         axles[key] = {"mass": load, "wheels": list(own["wheels"])}
-        axles[key] |= {name: own[name] for name in ("driven", "steered") if name in own}
+        axles[key] |= {name: own[name] for name in ("driven", "steered", "pivots") if name in own}
         if not own.get("driven", True) and values["bearing_resistance"]:
             axles[key]["bearing_resistance"] = 0.0  # it is of the geared drive, which a free wheel has not
     inertia = values["wheel_inertia"]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Bools, Floats, Ints
-from terragrip.physics.loads import GRAVITY, wheel_shares
+from terragrip.physics.loads import GRAVITY
 from terragrip.physics.slip import hub_speed, middle_speed
 from terragrip.recording import Recording
 from terragrip.recording.window_means import window_means, windows_of
@@ -217,11 +217,7 @@ def wheel_loads(
         for here, other in ((0, 1), (1, 0)):
             rest = known[:, here] & ~known[:, other]
             axles[rest, other] = total[rest] - axles[rest, here]
-    level, leaning = wheel_shares(
-        [len(axle.wheels) for axle in vehicle.axles.values()],
-        center_of_gravity_height=vehicle.center_of_gravity_height,
-        track=vehicle.track,
-    )
+    level, leaning = vehicle.wheel_shares
     shares = level - leaning * lateral[:, np.newaxis]
     static = vehicle.axle_mass[vehicle.wheel_axle] * GRAVITY * level
     return np.asarray(np.maximum(shares * axles[:, vehicle.wheel_axle], _LEAST_LOAD * static))
