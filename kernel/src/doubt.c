@@ -37,28 +37,30 @@ static tg_real by_lock(const tg_estimator *e, int32_t i)
 
 /* Variance of the lateral specific force, where neither an accelerometer nor a roll shows it: hills have no direction, so the ground is as
  * steep across the way as it is along it: as measured, else as the file states it. */
-static tg_real unseen_lateral(const tg_estimator *e, const tg_row *row)
+static tg_real unseen_lateral(const tg_estimator *e)
 {
     const tg_settings *s = &e->settings;
     const int32_t known = e->pitch.count > 0 || e->slope.running;
-    if (e->lateral.seen || !isnan(row->value[TG_ROLL])) return 0;
+    if (e->lateral.seen || e->roll.seen) return 0;
     return tgi_square(s->machine.gravity) * (known ? e->roughness.grade : tgi_square(s->uncertainty.slope));
 }
 
 /* What the wheels' chatter is in adhesion: the force that turns a wheel's speed so far in a sample's time, over its load. The square of
  * a torque's leap that its next sample has not confirmed, times how likely it is real: the more, the more of the time over which increments
  * are known lies between two samples, and the less it exceeds what two adhesions differ by. And shares of the wheel's torque, which the
- * other side has more: by a load that side slopes shift, and by the friction of a differential. */
+ * other side has more: by a load that side slopes shift, and by the friction of a differential. At rest brakes may hold any part of the
+ * torque. */
 void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
-    const tg_real lateral = unseen_lateral(e, row);
+    const tg_real lateral = unseen_lateral(e);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const tg_hold *const torque = &e->torque[i];
         const tg_real square = row->chatter[i], arm = s->machine.radius[i] * drive->load[i];
         const tg_real gross = e->belief.x[i] + s->machine.tire_rolling_resistance;
         e->scene.doubt[i] = square > 0 ? TG_PEAK * square * tgi_square(s->machine.inertia[i] / (arm * e->wheel[i].interval)) : 0;
         e->scene.sides[i] = tgi_square(gross) * (e->constants.lean[i] * lateral + (e->shared[i] == TG_SAME ? tgi_square(TG_LOCKING) : 0)) + by_lock(e, i);
+        if (e->standing) e->scene.doubt[i] += tgi_square(e->belief.x[i] / 2) + tgi_square(s->machine.tire_rolling_resistance);
         if (!(torque->spike > 0)) continue;
         const tg_real leap = torque->spike / tgi_square(arm), real = tgi_exp(-leap / (4 * tgi_square(s->prior_adhesion_std)));
         e->scene.doubt[i] += leap * real * torque->interval / (s->tuned.increment_memory + torque->interval);

@@ -139,7 +139,10 @@ static int32_t go_on(tg_estimator *e, tg_row *row, const tg_drive *drive, tg_inp
         return 1;
     }
     if (course == TG_REST) tgi_rest_reading(e, row);
-    else tgi_rest_over(e);
+    else {
+        tgi_rest_over(e);
+        e->by_torque = 0;
+    }
     if (course == TG_ANEW) tgi_restart_from(e, row, dt);
     if (course == TG_TURN) tgi_turn(e);
     if (course == TG_TURN || (course == TG_START && e->started)) tgi_unknown_adhesion(e);

@@ -153,6 +153,7 @@ struct tg_estimator {
     int32_t seen_motion;       /* a wheel or ground speed was seen: the outputs are numbers */
     int32_t standing;          /* at standstill */
     int32_t direction;         /* of travel: 1 forward, -1 in reverse */
+    int32_t by_torque;         /* at rest: adhesion follows from the torques */
     double time, measured_time, distance;
     tg_real last_raw[TG_SLOTS];
     double last_raw_time[TG_SLOTS];
@@ -174,7 +175,7 @@ struct tg_estimator {
     tg_real unseen_turn;       /* rad/s: by the rims, where no sensor shows the yaw rate or a joint bends; else 0 */
     double leap_time;          /* since when the ground speed contradicts standstill; infinite: it does not */
     tgi_settling settling[TG_GROUND_SPEED + 1]; /* by place in a sample */
-    tg_lowpass acceleration, lateral, balance;
+    tg_lowpass acceleration, lateral, roll, balance;
     tgi_slip_memory slip_memory;
     tgi_slope slope;
     tgi_roughness roughness;

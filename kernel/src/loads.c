@@ -5,6 +5,7 @@
 #define TG_MOST_MASS 10
 #define TG_LEAST_HITCH ((tg_real)-0.5) /* of the weight */
 #define TG_MOST_HITCH 2
+#define TG_STEEPEST ((tg_real)0.25) /* square of the roll's sine: 30 degrees */
 
 /* Update mass or hitch load with a sample, within limits. */
 static void bounded_input(tg_estimator *e, tg_hold *h, tg_row *row, int32_t slot, tg_real least, tg_real most)
@@ -70,12 +71,16 @@ static tg_real specific_force(tg_estimator *e, const tg_row *row)
 }
 
 /* Specific force to the left, which moves load from the left wheels to the right: the accelerometer's, else what the turn and a measured
- * roll make of it, v psi' + g sin(roll). */
-static tg_real lateral_force(tg_estimator *e, const tg_row *row, tg_real g)
+ * roll make of it, v psi' + g sin(roll). And the cosine of the roll: across a slope the ground carries less than the weight. */
+static tg_real lateral_force(tg_estimator *e, const tg_row *row, tg_real g, tg_real *upright)
 {
-    const tg_real roll = row->value[TG_ROLL], felt = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, e->settings.load_filter);
-    if (e->lateral.seen) return felt;
-    return (tg_real)e->direction * e->belief.x[e->settings.machine.wheels + 1] * e->yaw_rate + (isnan(roll) ? 0 : g * tgi_sin(roll));
+    const tg_real turn = (tg_real)e->direction * e->belief.x[e->settings.machine.wheels + 1] * e->yaw_rate;
+    const int32_t leans = e->lateral.seen && row->time - e->yaw_time <= 1; /* and does not turn unseen */
+    const tg_real felt = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, e->settings.load_filter);
+    const tg_real roll = tgi_lowpass(&e->roll, row->value[TG_ROLL], row->time, e->settings.load_filter);
+    const tg_real sine = e->roll.seen ? tgi_sin(roll) : leans ? (felt - turn) / g : 0, square = tgi_square(sine);
+    *upright = tgi_sqrt(1 - (square < TG_STEEPEST ? square : TG_STEEPEST));
+    return e->lateral.seen ? felt : turn + g * sine;
 }
 
 /* A load measured on an axle is used; axles without one share the rest of the weight by their static shares. */
@@ -119,7 +124,7 @@ static void oppose_turning(const tg_estimator *e, tg_drive *drive)
     }
 }
 
-/* F_k = share_k m g cos + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; added
+/* F_k = share_k m g cos cos(roll) + transfer_k moment, the moment that lifts the front being m h (dv/dt + g sin) + F_dx h_d + sum J dw/dt; added
  * to it a payload beyond the file's mass, with its own shares and height, and the load on the hitch. A wheel keeps at
  * least 2 % of its static load: the model divides by it. */
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
@@ -127,7 +132,8 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     const tg_settings *s = &e->settings;
     const tg_machine *m = &s->machine;
     tg_real a = specific_force(e, row), g = m->gravity;
-    tg_real weight = m->mass * g * drive->cosine, payload = drive->mass - m->mass;
+    tg_real upright, lateral = lateral_force(e, row, g, &upright);
+    tg_real weight = m->mass * g * drive->cosine * upright, payload = drive->mass - m->mass;
     tg_real moment = m->mass * s->center_of_gravity_height * a + drive->calm_drawbar * s->hitch_height
                    + e->constants.spin_inertia * (a - g * drive->sine);
     tg_real load[8], lean = 1;
@@ -138,13 +144,13 @@ void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive)
     }
     for (int32_t k = 0; k < s->axles; k++) load[k] = s->load_share[k] * weight - s->load_transfer[k] * moment;
     if (e->mass.count > 0 || e->hitch_load.count > 0) {
-        const tg_real more = payload * g * drive->cosine;
+        const tg_real more = payload * g * drive->cosine * upright;
         for (int32_t k = 0; k < s->axles; k++) load[k] += s->payload_share[k] * more + s->hitch_share[k] * drive->hitch_load;
         weight += more + drive->hitch_load;
     }
     use_measured(e, row, weight, load);
 
-    const tg_real lateral = lean * lateral_force(e, row, g);
+    lateral *= lean;
     for (int32_t k = 0; k < s->axles; k++) drive->axle_load[k] = load[k];
     for (int32_t i = 0; i < m->wheels; i++) {
         tg_real least = e->constants.least_load[i], wheel = load[s->wheel_axle[i]] * (s->wheel_share[i] - s->lateral_share[i] * lateral);

@@ -86,8 +86,8 @@ void tgi_turn(tg_estimator *e)
     tgi_place_adhesion(&e->filter, mu);
 }
 
-/* At standstill the low-passed speeds are the outputs; one that is no longer measured is that of a vehicle that stands. Adhesion is held;
- * before the first motion there is none to hold, and it follows from the torques, as uncertain as the prior. */
+/* At standstill the low-passed speeds are the outputs; one that is no longer measured is that of a vehicle that stands. Adhesion is held
+ * until the torques surely contradict it: wheels that show no slow turn may start unseen. Before the first motion it follows from them. */
 void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
 {
     const tg_settings *s = &e->settings;
@@ -99,12 +99,18 @@ void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
         P[j] = tgi_square(fresh ? s->noise[slot] : s->standstill_speed / (j < n ? s->rolling_radius[j] : 1));
     }
     restart(e, 0, x, P);
-    if (e->distance > 0) return;
+    if (e->braked) return;
     tg_real mu[TG_MAX_WHEELS];
+    e->by_torque |= !(e->distance > 0);
     for (int32_t i = 0; i < n; i++) {
-        const tg_real by_torque = e->torque[i].count ? d * e->torque[i].value / (s->machine.radius[i] * drive->load[i]) : 0;
-        mu[i] = tgi_fabs(by_torque) > 1 ? e->belief.x[i] : by_torque;
+        const tg_real arm = s->machine.radius[i] * drive->load[i], held = e->belief.x[i], by_torque = e->torque[i].count ? d * e->torque[i].value / arm : 0;
+        const tg_real beyond = tgi_fabs(by_torque - held) - s->machine.tire_rolling_resistance; /* which opposes any motion */
+        const tg_real variance = tgi_square(s->noise[TG_DRIVE_TORQUE + i] / arm) + e->belief.P[i * (tgi_stride(n) + 1)];
+        const int32_t possible = tgi_fabs(by_torque) <= 1;
+        e->by_torque |= possible && beyond > 0 && tgi_square(beyond) > tgi_square(s->tuned.spike) * variance;
+        mu[i] = possible ? by_torque : held;
     }
+    if (!e->by_torque) return;
     tgi_place_adhesion(&e->filter, mu);
 }
 

@@ -121,8 +121,32 @@ def test_lateral_acceleration_moves_load_to_the_outer_wheels():
 
 def test_roll_stands_in_for_a_missing_accelerometer():
     by_roll = estimate(steady(roll=0.2), robot(), held={})
-    by_force = estimate(steady(acceleration_y=GRAVITY * np.sin(0.2)), robot(), held={})
+    by_force = estimate(
+        steady(acceleration_y=GRAVITY * np.sin(0.2), angular_velocity_z=0.0), robot(), held={}
+    )
     assert by_roll["adhesion_rl"][-1] == pytest.approx(by_force["adhesion_rl"][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("shown", ["roll", "acceleration_y"])
+def test_across_a_slope_the_axles_carry_the_weight_times_the_cosine(shown):
+    """A hillside mower at 25 degrees: 9 % less."""
+    lean = np.radians(25)
+    more = (
+        {"roll": lean}
+        if shown == "roll"
+        else {"acceleration_y": GRAVITY * np.sin(lean), "angular_velocity_z": 0.0}
+    )
+    found = estimate(steady(**more), robot(), held={})
+    carried = found["vertical_load_front"][-1] + found["vertical_load_rear"][-1]
+    assert carried == pytest.approx(139 * GRAVITY * np.cos(lean), rel=1e-3)
+
+
+def test_a_roll_between_whose_samples_are_other_rows_leans_all_of_them():
+    """Ten rows a sample: between them no load went to the lower side."""
+    log = steady(roll=0.2)
+    slow = log.with_channels(roll=np.where(np.arange(len(log)) % 10 == 0, log["roll"], np.nan))
+    found, whole = (estimate(each, robot(), held={})["adhesion_rl"][-5] for each in (slow, log))
+    assert found == pytest.approx(whole, rel=1e-3)
 
 
 def test_a_wheel_never_floats():

@@ -130,3 +130,28 @@ def test_where_wheels_show_no_slow_turn_a_start_is_by_torque_and_ground_speed(di
     for wheel in WHEELS:
         error = np.abs(found[f"adhesion_{wheel}"] - truth[f"adhesion_{wheel}"])[starts]
         assert np.mean(error < np.maximum(1.96 * found[f"adhesion_{wheel}_std"][starts], 0.05)) > 0.95
+
+
+@pytest.mark.parametrize("rate", [100.0, 20.0])
+def test_a_start_that_no_speed_shows_yet_is_in_the_torques(rate: float):
+    """A second start at 1 m/s^2: wheels silent below .3 m/s, a ground speed with .05 of noise. The stop's adhesion stayed, ± .01."""
+    made = drive(
+        10.0,
+        rate=rate,
+        noise=0.3,
+        speed=lambda t: np.clip(np.where(t < 3.5, 4 - 2 * t + 2, t - 6), 0, 0.5) + 1e-9,
+        slip=lambda t: 0.1 * np.clip(20 * (t - 5.95), 0, 1),
+    )
+    time, truth = made.recording.time, made.truth
+    noise = 0.05 * np.random.default_rng(1).normal(size=len(time))
+    wheels = {f"wheel_speed_{w}": made.recording[f"wheel_speed_{w}"] for w in WHEELS}
+    silent = {name: np.where(np.abs(values) * RADIUS < 0.3, 0.0, values) for name, values in wheels.items()}
+    found = estimate(
+        made.recording.with_channels(**silent, ground_speed=truth["ground_speed"] + noise), robot()
+    )
+    starts = (time > 6.03) & (time < 6.3)
+    for wheel in WHEELS:
+        error = np.abs(found[f"adhesion_{wheel}"] - truth[f"adhesion_{wheel}"])
+        assert np.sqrt(np.mean(error[starts] ** 2)) < 0.08
+        rest = starts & (found["event"] == "standstill")
+        assert (error < 1.96 * found[f"adhesion_{wheel}_std"])[rest].all()
