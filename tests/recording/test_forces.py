@@ -144,6 +144,33 @@ def test_a_cell_with_nothing_towed_has_no_scale(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_a_trailer_that_only_starts_show_is_no_mass_of_the_machine(seed: int) -> None:
+    """On hard level ground its inertia is all that it pulls with, and that changes at once: its cell counted as noise, and .7 of the
+    machine's mass as missing in the file."""
+    draws = np.random.default_rng(seed)
+    time = np.arange(0, 120, 0.05)
+    rim = np.interp(time, np.arange(160) * 0.75, draws.uniform(0.7, 1.6, 160))
+    change = 0.97 * np.gradient(rim, time)
+    pull = 0.7 * MASS * change
+    thrust = MASS * change + pull + 0.06 * MASS * G
+
+    def noisy(values: np.ndarray, size: float) -> np.ndarray:
+        return values + size * draws.standard_normal(len(time))
+
+    columns = {
+        "time": time,
+        "ground_speed": noisy(0.97 * rim, 0.01),
+        "acceleration_x": noisy(change, 0.1),
+        "drawbar_force": noisy(pull, 20.0),
+    }
+    for wheel in ("fl", "fr", "rl", "rr"):
+        columns[f"wheel_speed_{wheel}"] = noisy(rim / RADIUS, 0.01)
+        spun = INERTIA * np.gradient(rim / RADIUS, time)
+        columns[f"drive_torque_{wheel}"] = noisy(thrust * RADIUS / 4 + spun, 1.0)
+    assert notes(columns, machine()) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_torques_in_pound_feet_are_named_where_nothing_is_towed(seed: int) -> None:
     """Given as N m they are .74 of what starts and stops need. Too large ones may pull a trailer that is not in the log."""
     columns = drive(seed)

@@ -201,7 +201,9 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     change = courses.rims if courses.shown is None else courses.shown
     scale = "the torques' scale (at the wheel, not at the motor: the gear ratio counts) and the wheel radius"
     if courses.pull is None or courses.beside is None:
-        fits = [courses.slopes(courses.thrust, own)[0] for own in (change, courses.change)]
+        # what a trailer's inertia pulls in starts is no instrument, but a part of the force all the same
+        left = courses.thrust if courses.pull is None else courses.thrust - courses.pull
+        fits = [courses.slopes(left, own)[0] for own in (change, courses.change)]
         off = all(mass.high < 1 / _FORCE for mass in fits)
         off |= courses.pull is not None and all(mass.low > _FORCE for mass in fits)
         return [_imbalance(fits[0], "", [scale, "the mass"], vehicle)] if off else []
