@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
+from collections import Counter
 from collections.abc import Callable, Generator
 from functools import cache
 from pathlib import Path
@@ -82,7 +83,25 @@ def pytest_collection() -> Generator[None, Any, Any]:
         gc.enable()
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects by marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    _mark_what_is_no_sample(items)
+    _spread(items)
+
+
+def _mark_what_is_no_sample(items: list[pytest.Item]) -> None:
+    """Of a test marked `sample(n)` the first case and each nth after it stay in `make test`: a step that divides neither of two numbers
+    of parameters comes to each of both."""
+    cases: Counter[tuple[Path, str]] = Counter()
+    for item in items:
+        if (sample := item.get_closest_marker("sample")) is not None:
+            test = item.path, item.nodeid.partition("[")[0]
+            if cases[test] % sample.args[0]:
+                item.add_marker(pytest.mark.long)
+            cases[test] += 1
+
+
+def _spread(items: list[pytest.Item]) -> None:
     """Spread each room's files evenly over those of the others, between what stands beside the rooms and the studio's: workers take
     file after file, and with all of them in `live`, which waits for brokers and timers, two thirds of the processors' time were idle."""
     files: dict[str, dict[Path, int]] = {}

@@ -217,6 +217,7 @@ def test_many_logs_and_one_file_is_refused(place: Path, capsys: pytest.CaptureFi
     assert "no log is named" in capsys.readouterr().err
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("clock", [0.0, 1.7e9])
 @pytest.mark.parametrize(("gap", "said"), [(0.1, True), (600.0, False)])
 def test_a_drive_that_was_cut_into_files_is_said(

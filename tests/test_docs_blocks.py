@@ -48,6 +48,16 @@ def parse(words: list[str]) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_what_the_python_of_a_page_imports_is_there(page: Path) -> None:
+    for language, text in FENCED.findall(page.read_text(encoding="utf-8")):
+        if language == "python":
+            for line in re.findall(r"^(?:from terragrip\S* )?import .*$", text, re.MULTILINE):
+                exec(line, {})
+            for name in re.findall(r"\btg\.(\w+)", text):
+                assert hasattr(tg, name), name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_program_takes_every_command_line_of_a_page(page: Path) -> None:
     for line in command_lines(page):
         words = shlex.split(line, comments=True)

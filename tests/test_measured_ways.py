@@ -106,6 +106,7 @@ GRASS = (
 )
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", GRASS)
 def test_nobody_is_stuck_on_the_grass(shared: Located, name: str) -> None:
     log = shared(f"data/drive_warthog/raw20hz/warthog_wheels_{name}.csv.gz")

@@ -43,7 +43,12 @@ def test_every_block_is_one_that_the_test_runs(page: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")  # test_demo.py and report/test_command.py draw the figures
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    # the simulated runs of tutorial.md take a minute; its commands and names are tried in test_docs_blocks.py
+    [pytest.param(page, marks=pytest.mark.long if page.stem == "tutorial" else ()) for page in PAGES],
+    ids=lambda page: page.stem,
+)
 def test_a_tutorial_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}

@@ -37,6 +37,7 @@ def test_every_class_makes_a_file_that_estimates(tmp_path: Path, name: str, sign
     assert vehicle.knows_wheels == (signals != "bus-speed")
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["field-robot", "tractor-4wd", "six-wheel"])
 def test_the_intervals_hold_for_machines_of_the_class(name: str) -> None:
     """True machines drawn from what is typical, each driven by the equations and estimated by the file that knows mass and radius."""

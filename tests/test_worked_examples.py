@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.long  # its commands: test_docs_blocks.py; a measured field hour: test_measured_ways.py
 def test_the_commands_of_the_page_run(shared, tmp_path: Path, monkeypatch, capsys) -> None:
     pytest.importorskip("geopandas", reason="needs terragrip[geo]")
     import geopandas

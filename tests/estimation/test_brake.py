@@ -59,6 +59,7 @@ def settled(time: Any) -> Any:
     return brakes(time) & (time % PERIOD > BRAKING + 0.2)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("method", [m for m in METHODS if m != "algebraic"])
 @pytest.mark.parametrize("imu", [True, False])
 def test_while_a_brake_acts_intervals_hold(method: str, imu: bool) -> None:

@@ -28,6 +28,7 @@ def counted(one: Drive, teeth: int) -> Recording:
     return Recording(time, channels)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("teeth", "rate"), [(8, 100.0), (20, 100.0), (8, 10.0)])
 def test_counted_pulses_are_refused_with_the_line_that_helps(teeth: int, rate: float) -> None:
     one = drive(90.0, rate=rate)

@@ -142,6 +142,7 @@ def test_wheels_that_spin_on_the_spot_are_no_standstill():
     assert np.abs(estimates["slip_rr"] - 0.97)[late].max() < 0.05
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("channel", ["ground_speed", "wheel_speed_fr", "drive_torque_rr", "drawbar_force"])
 @pytest.mark.parametrize("method", FILTERS)
 def test_a_spike_is_flagged_and_barely_moves_the_estimate(channel, method):

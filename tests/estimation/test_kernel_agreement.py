@@ -128,6 +128,7 @@ def test_the_long_problem_exercises_what_it_should(policy, long_problem):
         assert np.max(np.ptp([r["mode"] for r in reports], axis=0)) > 0.5
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 @pytest.mark.parametrize("wheels", range(1, 9))
 def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
@@ -149,6 +150,7 @@ def test_agrees_for_any_number_of_wheels(wheels, engine, policy, problem):
     assert_agree(case, tuning)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_where_mass_and_hitch_load_change(engine, policy, problem):
     case = problem(32, wheels=4, steps=120, condition=1e6, accelerometer=True, missing=0.1, loaded=True)
@@ -299,6 +301,7 @@ class Deviations:
         self.columns = self.prior - step.update.gain @ expected[step.update.present]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("engine", ["exact", "unscented"])
 @pytest.mark.parametrize("policy", ["fixed", "supervised"])
 def test_considered_columns_and_smoother_agree(engine, policy, problem):

@@ -231,6 +231,7 @@ def test_a_start_is_followed_at_once() -> None:
     )  # 0.25 to 0.35, after 0.1 before the stop
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_manoeuvres_at_1_hz_are_no_outliers(seed: int) -> None:
     """A speed came out as 4.41 ± .49 where ground speed and wheels said .98, and a tenth of the rows as outliers."""

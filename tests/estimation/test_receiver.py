@@ -60,6 +60,7 @@ MACHINES = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize("torques", [True, False])
 def test_what_a_turn_adds_to_the_ground_speed_is_taken_off(name: str, torques: bool) -> None:

@@ -67,6 +67,7 @@ def assert_same_moments(got: tuple[Array, Array], expected: tuple[Array, Array],
     assert np.max(np.abs(got[1] - expected[1]) / np.outer(sd, sd)) < tolerance
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("states", "channels"), [(1, 1), (4, 1), (4, 4), (9, 3)])
 def test_agrees_with_a_ten_line_filter(engine, states, channels, ten_line_filter):

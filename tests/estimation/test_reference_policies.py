@@ -42,6 +42,7 @@ def run(problem: Any, tuning: Tuning, start: Any = None) -> TractionFilter:
     return filter
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("engine", ["exact", "unscented"])
 @pytest.mark.parametrize("policy", ["adaptive", "supervised"])
 def test_sensitivities_agree_with_differences_of_the_whole_recursion(engine, policy, problem):

@@ -69,6 +69,7 @@ def test_runge_kutta_stays_near_the_exact_solution():
 # ---- the filter ----
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("policy", ["fixed", "adaptive", "supervised"])
 def test_exact_and_unscented_agree(policy, problem):
     case = problem(8, wheels=3, steps=300, missing=0.1, spikes=0.02, accelerometer=True, restarts=True)
@@ -110,6 +111,7 @@ def test_exact_agrees_with_a_ten_line_filter(problem, ten_line_filter):
         assert agreement(filter.moments(), (x[:6], P[:6, :6])) < 1e-9
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("policy", ["fixed", "supervised", "bank"])
 def test_double_agrees_with_long_double(policy, problem):
     case = problem(31, wheels=2, steps=200, condition=1e5, missing=0.1, accelerometer=True, restarts=True)

@@ -35,6 +35,7 @@ def drive(wheels: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return time, speeds
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("wheels", "seed"), [(1, 1000), (2, 1001), (4, 1002), (8, 1003)])
 def test_kernel_and_twin_agree(wheels: int, seed: int) -> None:
     names = tuple(f"w{k}" for k in range(wheels))

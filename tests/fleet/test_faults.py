@@ -109,6 +109,7 @@ def test_a_worker_that_is_killed_in_mid_task(place: Path, capsys: pytest.Capture
     assert (len(rows), reasons) == (7, {})
 
 
+@pytest.mark.long  # test_cluster.py: a batch that loses its worker twice
 @pytest.mark.usefixtures("scratch")
 def test_a_log_that_needs_more_memory_than_a_worker_has(
     place: Path, capsys: pytest.CaptureFixture[str]
@@ -128,6 +129,7 @@ def test_a_log_that_needs_more_memory_than_a_worker_has(
     assert "memory" in reasons["bomb.mat"]
 
 
+@pytest.mark.long  # test_fleet.py: what a killed call leaves
 def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_log(place / "logs/a/long.csv", 7, seconds=LONG)
     process = start(place, "--workers", 1)
@@ -145,6 +147,7 @@ def test_a_call_that_is_killed_goes_on(place: Path, capsys: pytest.CaptureFixtur
     assert (len(rows), reasons) == (7, {})
 
 
+@pytest.mark.long  # test_cluster.py: its results are lost with it
 def test_a_scheduler_that_is_lost_and_restarted(
     place: Path, started: list[subprocess.Popen[bytes]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -168,6 +171,7 @@ def test_a_scheduler_that_is_lost_and_restarted(
     assert (len(rows), reasons) == (7, {})
 
 
+@pytest.mark.long  # test_cluster.py: no worker comes back
 def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     place: Path,
     started: list[subprocess.Popen[bytes]],
@@ -256,7 +260,7 @@ fsspec.register_implementation("moody", Moody, clobber=True)
 '''
 
 
-@pytest.mark.long  # test_s3.py shows it of a real store
+@pytest.mark.long  # test_cluster.py: the store alone
 def test_a_store_that_refuses_for_a_while(place: Path) -> None:
     (place / "site").mkdir()
     (place / "marks").mkdir()

@@ -633,6 +633,18 @@ def test_estimates_that_are_gone_or_cut_short_are_made_anew(estimated: Path, ran
     assert len(whole(estimated)[0]) == 6
 
 
+def test_what_a_killed_call_leaves_is_removed(place: Path, estimated: Path, ran: Ran) -> None:
+    """Its lock, a worker's folder with half of a log, and a log whose estimates no note names yet."""
+    (estimated / ".lock").touch()
+    half = estimated / ".tmp/terragrip-fleet-1/drive.parquet"
+    half.parent.mkdir(parents=True)
+    half.write_bytes(b"PAR1")
+    next((estimated / "state/logs").iterdir()).unlink()
+    assert "1 estimated, 5 unchanged, 0 failed" in ran()[1]
+    rows, reasons = whole(estimated)
+    assert (len(rows), reasons) == (6, {})
+
+
 def test_a_log_with_estimates_is_no_failure(place: Path, estimated: Path, ran: Ran) -> None:
     """A worker may have stored a log's note just before it was lost."""
     table = pa.table({"log": ["drive0.csv"], "reason": ["its worker was lost"]})

@@ -67,6 +67,7 @@ def moody() -> Iterator[tuple[Moody, dict[str, str]]]:
     server.shutdown()
 
 
+@pytest.mark.long  # test_cluster.py: a store that refuses each first write
 def test_logs_and_data_set_on_s3(
     place: Path,
     moody: tuple[Moody, dict[str, str]],

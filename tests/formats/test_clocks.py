@@ -157,6 +157,7 @@ def test_an_offset_within_twice_its_deviation_is_not_corrected(seed: int) -> Non
     assert abs(lag.seconds) > 2 * lag.std or not lag.is_of_the_clock
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(1000, 1004))
 @pytest.mark.parametrize("held", [False, True])
 def test_a_lag_within_one_file_is_found_and_said(tmp_path: Path, seed: int, held: bool) -> None:

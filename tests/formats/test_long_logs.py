@@ -114,6 +114,7 @@ def test_a_small_file_that_unpacks_to_a_large_one_is_read_in_blocks(
         tg.read(path)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "content", ["0.0,1.0,5.0,1\n", "\n", "\0", "1"], ids=["rows", "lines", "zeros", "one line"]
 )

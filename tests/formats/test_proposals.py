@@ -773,6 +773,7 @@ def test_any_table_gives_proposals(
     assert all(0 <= proposal.confidence <= 1 for proposal in result.values())
 
 
+@pytest.mark.long  # each kind of header: above
 def test_measured_headers_leaving_one_logger_out(shared: Callable[[str], Path]) -> None:
     shared("data/headers/truth.json")
     path = Path(__file__).parents[2] / "benchmarks" / "bench_inspect.py"

@@ -71,6 +71,7 @@ def drive(vehicle: Vehicle) -> tuple[dict[str, Floats], dict[str, float]]:
     return {wheel: GROUND / (1 - SLIP) / radius for wheel, radius in radii.items()}, radii
 
 
+@pytest.mark.long  # measured drives: above and below
 def test_on_development_machines_it_is_never_sure_and_wrong() -> None:
     """Simulated: machines of 5 kg to 12 t at work, nine units each; file and machine agree on the radius within some per cent."""
     sure = dict.fromkeys(UNITS, 0)
@@ -99,6 +100,7 @@ def test_on_development_machines_it_is_never_sure_and_wrong() -> None:
     assert sure["m/s"] > 0.3 * count
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("machine_name", "log"),
     [

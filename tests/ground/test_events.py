@@ -69,16 +69,17 @@ def test_a_soft_spot_is_warned_of_before_the_vehicle_stands(curve, rate):
     assert abs(stuck[0].start - stop) < 1.5
 
 
-def test_hills_hits_and_stops_are_not_called_stuck_and_rarely_warned_of():
-    """The rate of false warnings is benchmarks/bench_warning.py's; one in 30 minutes is asked, so in 12 minutes more than two would be out
-    of order (none is there)."""
+@pytest.mark.parametrize(("seeds", "most"), [(4, 1), pytest.param(12, 2, marks=pytest.mark.long)])
+def test_hills_hits_and_stops_are_not_called_stuck_and_rarely_warned_of(seeds, most):
+    """The rate of false warnings is benchmarks/bench_warning.py's; one in 30 minutes is asked, so in 4 minutes more than one would be out
+    of order, in 12 more than two (none is there)."""
     warned = 0
-    for seed in range(12):
+    for seed in range(seeds):
         result = healthy(seed)
         kinds = [e.kind for e in events(estimate(result.recording, result.vehicle))]
         assert ("stuck" in kinds) == bool(result.truth["stuck"].any())
         warned += kinds.count("immobilization") if "stuck" not in kinds else 0
-    assert warned <= 2
+    assert warned <= most
 
 
 def test_one_diagonal_that_spins_is_seen_and_stuck_in_time():

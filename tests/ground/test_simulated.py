@@ -12,7 +12,10 @@ from terragrip.ground.live import LiveGround
 from terragrip.simulation import simulate
 from terragrip.simulation.campaign import run_seed
 
-pytestmark = pytest.mark.usefixtures("unchecked")
+pytestmark = [
+    pytest.mark.usefixtures("unchecked"),
+    pytest.mark.long,  # in closed form: test_recognition.py, test_changes.py, test_live.py
+]
 
 
 def run(name, seed):

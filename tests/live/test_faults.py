@@ -104,6 +104,7 @@ async def fed(service, sent, last=lambda: None) -> None:
         last()
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(12))
 async def test_what_is_in_the_record_is_the_run_to_the_last_bit(tmp_path, vehicle, port, seed):
     """Copied as a kill would leave it, the record gives the state of the run that goes on, and its rows."""
@@ -129,6 +130,7 @@ async def test_what_is_in_the_record_is_the_run_to_the_last_bit(tmp_path, vehicl
         assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("seed", range(20))
 async def test_killed_at_any_byte_it_goes_on_as_one_run(tmp_path, vehicle, port, short, seed):
     """The write-ahead file, cut anywhere, is resumed; what is behind the cut is sent again."""

@@ -113,6 +113,7 @@ def test_it_is_causal_and_given_settings_are_not_touched(vehicle, long, learned,
         assert np.array_equal(whole.columns[name], values, equal_nan=True), name
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("stops", [(950, 1003, 1800), (400, 2500, 4100)])
 def test_a_restart_changes_no_digit(vehicle, long, learned, tmp_path, stops):
     """Broken off and gone on, before and after what was learned; snapshots and write-ahead file both hold it."""

@@ -464,5 +464,5 @@ async def test_a_device_that_goes_while_the_service_ends_prints_no_traceback():
     del task
     for _ in range(3):  # the loop lets go of what it has called
         await asyncio.sleep(0)
-        gc.collect()
+    gc.collect()
     assert said == []

@@ -23,6 +23,7 @@ PATIENCE = 300.0
 """How long [s] a busy machine may need; no test passes or fails by what it waits less."""
 
 
+@pytest.mark.long  # of one vehicle: test_cli.py; of several in one process: test_many.py
 @pytest.mark.asyncio
 async def test_killed_and_started_again_each_goes_on(tmp_path, vehicle, port):
     """Two kills among the samples of three vehicles: every estimate heard a second before a kill is kept, and all are those of one run."""

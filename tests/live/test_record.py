@@ -71,7 +71,7 @@ def killed_child(act, seconds: float | None = None) -> bool:
     return os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0
 
 
-@pytest.mark.parametrize("least", [25, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("least", [10, pytest.param(100, marks=pytest.mark.long)])
 def test_killed_many_times_it_ends_as_if_never_interrupted(tmp_path, vehicle, least):
     import pyarrow.parquet  # noqa: F401  # here, so that a child need not
 

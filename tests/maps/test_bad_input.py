@@ -174,6 +174,7 @@ def test_a_datum_that_is_none_of_latitude_and_longitude(
     assert "latitude and longitude" in error
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("heading", [0.0, 45.0, 90.0])
 def test_a_grid_too_fine_is_refused_with_a_size_that_does(
     tmp_path: Path, heading: float, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -54,7 +54,10 @@ def test_a_geotiff_tells_what_was_driven_from_what_is_kriged(tmp_path: Path) -> 
     assert np.all(band["passes"][kriged] == 0)
 
 
-@pytest.mark.parametrize("name", ["map.gpkg", "map.tif", "map.geojson", "map.parquet", "map.png"])
+@pytest.mark.parametrize(
+    "name",
+    ["map.gpkg", "map.tif", "map.geojson", "map.parquet", pytest.param("map.png", marks=pytest.mark.long)],
+)
 def test_a_disk_that_is_full_is_one_line_and_no_file(
     estimates: Path,
     tmp_path: Path,

@@ -30,6 +30,7 @@ def exchanged(log: Recording, vehicle: Vehicle) -> Recording:
     return replace(log, channels=channels, delay=None)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
 def test_speeds_of_a_free_axle_and_a_driven_one_that_are_exchanged_are_named(
     kind: families.Kind, seed: int, rate: float

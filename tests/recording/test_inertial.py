@@ -42,6 +42,7 @@ def lag_notes(log: Recording, vehicle: Vehicle) -> list[str]:
     return [note for note in unit_warnings(log, vehicle) if "the wheel speeds: if" in note]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
 def test_sensors_of_one_instant_are_left_alone(kind: families.Kind, seed: int, rate: float) -> None:
     log, vehicle = drive(kind, seed, rate)
@@ -58,6 +59,7 @@ def test_rows_that_are_too_far_apart_show_no_lag(factor: float) -> None:
     assert not lag_notes(slow, vehicle)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("kind", "seed", "rate"), MACHINES)
 @pytest.mark.parametrize("seconds", [0.5, -0.4])
 def test_an_inertial_sensor_that_is_late_or_early_is_named(

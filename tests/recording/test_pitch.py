@@ -30,6 +30,7 @@ def said(log: Recording, pitch: np.ndarray) -> list[str]:
     return [n for n in unit_warnings(log.with_channels(pitch=pitch), None) if n.startswith("pitch")]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("case", MACHINES)
 def test_a_right_pitch_is_left_alone(case: Case) -> None:
     log = drive(*case)
@@ -84,6 +85,7 @@ def test_a_zero_that_moves_in_the_drive_is_named_with_the_instant(case: Case, na
     assert unit_warnings(log.with_channels(acceleration_x=unmoved), None) == []
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", MACHINES[1:])
 def test_an_accelerometer_further_off_than_the_vehicle_file_says_is_named_until_it_is_calibrated(
     case: Case,

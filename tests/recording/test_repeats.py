@@ -89,7 +89,7 @@ def test_a_row_for_each_message_makes_one_row() -> None:
     assert [n for n in found.notes if "repeat" in n] == [f"400 {NOTE}"]
 
 
-@pytest.mark.parametrize("size", [1, 50, 1000])
+@pytest.mark.parametrize("size", [50, 1000, pytest.param(1, marks=pytest.mark.long)])
 def test_messages_that_come_late_by_a_row_are_sorted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:

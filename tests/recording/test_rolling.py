@@ -24,6 +24,7 @@ def notes_on(result: SimulationResult, factor: float) -> list[str]:
     return unit_warnings(result.recording, Vehicle.from_dict(data))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("chassis", ["sprung", "rigid", "rolling"])
 def test_radii_that_are_too_small_by_8_percent_are_named(chassis: families.Chassis) -> None:
     """On most machines: one that slips by more in its work hides it."""

@@ -29,6 +29,7 @@ def notes_on(
     return unit_warnings(replace(log, channels=kept), result.vehicle)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("number", range(24))
 def test_a_right_log_is_left_alone(number: int) -> None:
     result = machine(number)

@@ -53,6 +53,7 @@ def test_fits_reach_scipys_minimum(name):
     assert ours <= 2 * peer.cost * (1 + 1e-4) + 1e-12
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("name", "truth", "asked"),
     [("exponential", {"a": 0.85}, "a"), ("effective", {"A": 0.5, "k": 11.0, "d": 0.1}, "A")],

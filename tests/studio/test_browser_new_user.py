@@ -82,6 +82,7 @@ def make_robot(hand: Hand) -> None:
     hand.page.wait_for_selector("text=not known: mass on the front axle")
 
 
+@pytest.mark.long  # a tractor's log to its estimates: below
 def test_from_a_strangers_log_to_a_report_in_25_clicks(
     page: Any, served: Served, folder: Path, foreign: Path, made: Path
 ) -> None:

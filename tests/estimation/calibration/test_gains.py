@@ -71,6 +71,7 @@ def test_an_interval_has_the_degrees_of_freedom_of_its_stretches(drive: Make, ve
     assert quantity.factor == pytest.approx(student.ppf(0.975, int(stretches) - 1))
 
 
+@pytest.mark.long  # one patchy ground: test_patchy_ground_alone_sets_the_error_of_the_fit
 def test_intervals_hold_over_noise_and_patchy_ground(drive: Make, vehicle: Vehicle) -> None:
     inside, z = [], []
     for seed in range(12):

@@ -12,7 +12,7 @@ from terragrip.simulation import Scenario, simulate
 
 pytestmark = pytest.mark.usefixtures("unchecked")
 
-SEEDS = range(2000, 2008)
+SEEDS = {"three": range(2000, 2003), "eight": range(2000, 2008)}
 WHEELS = ("fl", "fr", "rl", "rr")
 FREE = {
     "vehicle": "innok-heros-444",
@@ -26,15 +26,15 @@ FREE = {
 WORK = {"extends": "accuracy-clean", "sensors": {"use": "robot"}, "robot": {"wheel_radius_sd": 0.01}}
 
 
-@pytest.fixture(scope="module")
-def machines() -> list[tuple[Calibration, dict[str, Any]]]:
+@pytest.fixture(scope="module", params=["three", pytest.param("eight", marks=pytest.mark.long)])
+def machines(request: pytest.FixtureRequest) -> list[tuple[Calibration, dict[str, Any]]]:
     """Each machine's calibration, from 90 s without a tool and 240 s of work on five soils, and the truth.
 
     Ordinary sensors: 25 to 100 Hz, torque gains 2 %, torque zeros 0.3 N m, drawbar zero 3 N, accelerometer 0.03 m/s².
     """
     free, work = Scenario.from_dict(FREE), Scenario.from_dict(WORK)
     out = []
-    for seed in SEEDS:
+    for seed in SEEDS[request.param]:
         logs = [simulate(s, seed + 10_000 * k, machine_seed=seed) for k, s in enumerate((free, work))]
         result = calibrate([log.recording for log in logs], logs[0].vehicle)
         out.append((result, logs[0].true_parameters["calibration"]))
@@ -71,9 +71,9 @@ def errors(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> tupl
 def test_intervals_hold_the_truth(machines: list[tuple[Calibration, dict[str, Any]]], key: str) -> None:
     z, inside = errors(machines, key)
     wheels = 1 if key in ("drawbar_offset", "acceleration_bias_x", "pitch_offset") else 4
-    assert len(z) == len(SEEDS) * wheels
-    # Wheels of one machine err together: eight machines, not 32 independent errors. 2 misses of 8 have a chance of 6 %.
-    assert np.mean(inside) >= 0.75
+    assert len(z) == len(machines) * wheels
+    # Wheels of one machine err together: eight machines, not 32 independent errors. 2 misses of 8 have a chance of 6 %, 1 of 3 of 14.
+    assert np.mean(inside) >= (0.75 if len(machines) > 3 else 2 / 3)
     assert np.sqrt(np.mean(np.square(z))) < 1.6
 
 

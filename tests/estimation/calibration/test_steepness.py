@@ -63,7 +63,7 @@ def test_a_late_ground_speed_does_not_bend_the_curve() -> None:
 def test_gains_of_axles_that_slip_unlike_hold_with_a_radius_that_is_wrong_on_all() -> None:
     """Front wheels that slip by 1 % more than rear ones, all radii 2 % too large: gains came out 6 to 9 % apart, ten SDs."""
     scores = []
-    for seed in range(12):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         slip = rng.uniform(0.005, 0.08, N)[:, None] + np.array([0.01, 0.01, 0.0, 0.0])
         leverage = np.full((N, 4), 60.0)

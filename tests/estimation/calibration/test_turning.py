@@ -35,6 +35,7 @@ def test_a_circling_machine_is_asked_for_a_yaw_rate(seed: int, soft: float) -> N
     )
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", [1000, 1001])
 @pytest.mark.parametrize("circling", [False, True])
 @pytest.mark.parametrize("soft", [0.05, 0.15])

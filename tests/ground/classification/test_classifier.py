@@ -96,6 +96,7 @@ def test_sensors_may_be_missing_in_part_of_the_training() -> None:
     assert result.score(shown, truth) > 0.9
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("wheels", [("only",), ("fl", "fr", "ml", "mr", "rl", "rr", "tl", "tr")])
 def test_one_to_eight_wheels(wheels: tuple[str, ...]) -> None:
     tables, labels = drives(range(1000, 1003), wheels=wheels)
@@ -241,6 +242,7 @@ def test_the_same_seed_gives_the_same_classifier_and_scikit_learn_can_clone_it(h
     assert first.n_features_in_ == len(first.feature_names_in_)
 
 
+@pytest.mark.long  # it is cloned and fitted anew: above
 def test_scikit_learn_can_cross_validate_it() -> None:
     from sklearn.model_selection import cross_val_score
 

@@ -23,6 +23,7 @@ LEARNT = {
 HELD_OUT = {"ASPHALT": "04", "FLOORING": "03", "ICE": "02", "SANDY_LOAM": "12", "SNOW": "16"}
 
 
+@pytest.mark.long  # simulated grounds: test_classifier.py
 def test_five_real_grounds_on_runs_never_seen(
     shared: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
