@@ -26,7 +26,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: beside-long collected pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: beside-long pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -41,9 +41,9 @@ test: ## set up, then lint, type checks, import rules, C tests and Python tests
 # Side by side, so that no processor waits for apt, pip, npm or a test's timer; four jobs, the longest way first. Each command's output in one piece.
 AT_ONCE := --no-print-directory BESIDE=1 -j 4 $(if $(findstring output-sync,$(.FEATURES)),--output-sync=line)
 
-# Every test file imported once: else each worker of pytest would rewrite and compile all of them anew.
-collected: $(VENV)/package $(VENV)/dev
-	@mkdir -p build && $(BIN)/python -m pytest --collect-only -q > build/collected.txt || { tail -n 40 build/collected.txt; exit 1; }
+# Every test file imported once after a change: else each worker of pytest would rewrite and compile all of them anew.
+build/collected.txt: $(wildcard tests/*.py tests/*/*.py tests/*/*/*.py) pyproject.toml | $(VENV)/package $(VENV)/dev
+	@mkdir -p build && $(BIN)/python -m pytest --collect-only -q > $@ || { tail -n 40 $@; exit 1; }
 
 lint: $(VENV)/package $(VENV)/dev ## ruff, mypy and import-linter
 	$(BIN)/ruff check
@@ -66,7 +66,7 @@ system: ## as root on Debian: install the programs that the tests of studio and 
 # importing every test file, and then for what the tests of a room share. A worker takes a whole file, then the next in order,
 # so that what a file's tests share is made once. The workers fill the processors: no threads inside a product of matrices.
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/python -m pytest --dist loadfile --no-loadscope-reorder -n
-pytest: collected studio system ## the Python tests alone
+pytest: $(VENV)/package $(VENV)/dev build/collected.txt studio system ## the Python tests alone
 	$(PYTEST) $(shell expr 2 \* $(WORKERS))
 
 studio: $(VENV)/made ## build the studio's pages, where Node.js 20 or newer is

@@ -16,6 +16,7 @@ from terragrip.simulation import Scenario
 pytest.importorskip("fastapi", reason="the studio needs terragrip[studio]")
 
 
+@pytest.mark.long  # the old file stands until the new one is whole: test_files.py
 def test_a_studio_lists_and_reads_while_two_command_lines_write_one_file(tmp_path: Path) -> None:
     from fastapi.testclient import TestClient
 

@@ -141,6 +141,7 @@ def test_a_step_of_A_lowers_the_mismatch(factor):
     assert mismatch(after, C) < mismatch(before, C)  # with the L of each, too
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("assumed", [0.1, 10.0])
 def test_A_finds_a_wrong_noise_of_a_random_walk(assumed):
     rng = np.random.default_rng(7)
@@ -160,6 +161,7 @@ def test_A_finds_a_wrong_noise_of_a_random_walk(assumed):
     )  # in shares of the true noise, though assumed 10 times off
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("assumed", [0.1, 10.0])
 def test_A_finds_a_wrong_adhesion_noise_of_a_machine(assumed):
     rng = np.random.default_rng(1)

@@ -82,6 +82,7 @@ def test_another_origin_of_time_gives_the_same_estimates(origin, method, rate):
     assert_alike(estimate(later, robot(), method=method), estimate(log, robot(), method=method))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_snapshot_of_single_precision_continues_to_the_bit(method, single):
     log = drive(6.0, rate=50.0, seed=3).recording

@@ -296,6 +296,7 @@ def test_steps_are_means_of_their_blocks_however_they_come(cuts, length):
     np.testing.assert_array_equal(pieces.start, whole.start)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("one_ground", [10, 120])
 def test_a_long_drive_searched_in_pieces_has_the_changes_of_the_whole(monkeypatch, one_ground):
     pieces = [("grass", GRASS, one_ground), ("fine", FINE, one_ground)] * (240 // one_ground)

@@ -30,6 +30,7 @@ def late(recording: Recording, seconds: float) -> Recording:
     return replace(recording, channels={**recording.channels, "ground_speed": moved})
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("number", [14, 17])
 def test_slip_of_a_log_with_a_lag_is_that_of_the_log_without(number: int) -> None:
     result = machine(number)

@@ -89,7 +89,7 @@ def test_a_row_for_each_message_makes_one_row() -> None:
     assert [n for n in found.notes if "repeat" in n] == [f"400 {NOTE}"]
 
 
-@pytest.mark.parametrize("size", [50, 1000, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("size", [1, 50, 1000])
 def test_messages_that_come_late_by_a_row_are_sorted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
@@ -148,7 +148,7 @@ def test_another_value_at_the_same_time_is_refused(column: str, value: object) -
         PLAIN.apply(frame)
 
 
-@pytest.mark.parametrize("size", [1, 50, 1000])
+@pytest.mark.parametrize("size", [50, 1000, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("rows", [[3], [0, 99, 99, 100, 399], list(range(400))])
 def test_a_file_in_blocks_is_what_it_is_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: list[int], size: int

@@ -98,7 +98,7 @@ def test_accuracy_drive_moves_nearly_always_and_visits_every_soil(clean, drive):
     assert set(t.soil) == {"hard", "fine", "wet", "coarse", "grass"}
     assert t.true_drawbar_force.quantile(0.99) > 350
     assert t.time.iloc[-1] == 240
-    shares = [stuck(drive(clean.scenario, seed, stride=20)).mean() for seed in range(1000, 1004)]
+    shares = [stuck(drive(clean.scenario, seed, stride=20)).mean() for seed in range(1000, 1012)]
     assert np.mean(shares) < 0.03
     assert np.median(shares) == 0
 

@@ -65,7 +65,7 @@ class Reference:
         return np.hypot(np.sqrt(self.P), self.column)
 
 
-@settings(max_examples=20)  # each of 150 steps
+@settings(max_examples=10)  # each of 150 steps
 @given(seed=st.integers(0, 10_000), pairs=st.integers(1, 8))
 def test_kernel_agrees_with_numpy(seed, pairs):
     rng = np.random.default_rng(seed)

@@ -65,6 +65,7 @@ def test_stretches_are_twenty_metres_or_a_fortieth_of_the_way() -> None:
     assert radii._stretches(far).max() in (40, 41)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_soil_that_lasts_for_half_a_log_without_labels_is_in_the_interval(seed: int) -> None:
     """Hard ground, then grass, on which it takes more and slips more (simulation; the radius is .2 m): one curve through both made .2052 m
