@@ -214,7 +214,9 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
         return 0.0, 1.0
     z, p = 1.96, hits / count
     middle, half = p + z * z / (2 * count), z * np.sqrt(p * (1 - p) / count + z * z / (4 * count**2))
-    return max(float((middle - half) / (1 + z * z / count)), 0.0), float((middle + half) / (1 + z * z / count))
+    return max(float((middle - half) / (1 + z * z / count)), 0.0), float(
+        (middle + half) / (1 + z * z / count)
+    )
 
 
 def poisson(count: int) -> tuple[float, float]:
