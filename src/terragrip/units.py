@@ -28,18 +28,20 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "s": (1.0, (0, 0, 1, 0)), "ms": (1e-3, (0, 0, 1, 0)),
     "us": (1e-6, (0, 0, 1, 0)), "µs": (1e-6, (0, 0, 1, 0)),
     "ns": (1e-9, (0, 0, 1, 0)), "min": (60.0, (0, 0, 1, 0)), "h": (3600.0, (0, 0, 1, 0)),
-    "A": (1.0, (0, 0, 0, 1)), "mA": (1e-3, (0, 0, 0, 1)),
+    "A": (1.0, (0, 0, 0, 1)),
     "V": (1.0, (1, 2, -3, -1)),
-    "N": (1.0, (1, 1, -2, 0)), "kN": (1e3, (1, 1, -2, 0)), "mN": (1e-3, (1, 1, -2, 0)), "daN": (10.0, (1, 1, -2, 0)),
+    "N": (1.0, (1, 1, -2, 0)),
     "kgf": (STANDARD_GRAVITY, (1, 1, -2, 0)), "kp": (STANDARD_GRAVITY, (1, 1, -2, 0)),
-    "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)), "kip": (453.59237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "lbf": (0.45359237 * STANDARD_GRAVITY, (1, 1, -2, 0)), "oz": (0.45359237 / 16, (1, 0, 0, 0)),
+    "ozf": (0.45359237 / 16 * STANDARD_GRAVITY, (1, 1, -2, 0)), "tf": (1e3 * STANDARD_GRAVITY, (1, 1, -2, 0)),
+    "mg": (1e-6, (1, 0, 0, 0)), "kip": (453.59237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
     "kips": (453.59237 * STANDARD_GRAVITY, (1, 1, -2, 0)),
     "J": (1.0, (1, 2, -2, 0)),
-    "W": (1.0, (1, 2, -3, 0)), "kW": (1e3, (1, 2, -3, 0)), "PS": (75 * STANDARD_GRAVITY, (1, 2, -3, 0)),
+    "W": (1.0, (1, 2, -3, 0)), "PS": (75 * STANDARD_GRAVITY, (1, 2, -3, 0)),
     "Pa": (1.0, (1, -1, -2, 0)), "kPa": (1e3, (1, -1, -2, 0)), "MPa": (1e6, (1, -1, -2, 0)),
     "hPa": (1e2, (1, -1, -2, 0)), "bar": (1e5, (1, -1, -2, 0)), "mbar": (1e2, (1, -1, -2, 0)),
     "psi": (0.45359237 * STANDARD_GRAVITY / 0.0254**2, (1, -1, -2, 0)),
-    "rad": (1.0, _ONE), "mrad": (1e-3, _ONE), "deg": (math.pi / 180, _ONE), "degree": (math.pi / 180, _ONE),
+    "rad": (1.0, _ONE), "deg": (math.pi / 180, _ONE), "degree": (math.pi / 180, _ONE),
     "degrees": (math.pi / 180, _ONE), "°": (math.pi / 180, _ONE), "Grad": (math.pi / 180, _ONE), "rev": (2 * math.pi, _ONE),
     "turn": (2 * math.pi, _ONE), "%": (1e-2, _ONE), "percent": (1e-2, _ONE), "‰": (1e-3, _ONE), "1": (1.0, _ONE),
     "rpm": (2 * math.pi / 60, (0, 0, -1, 0)), "rps": (2 * math.pi, (0, 0, -1, 0)),
@@ -48,9 +50,25 @@ _BASE: dict[str, tuple[float, Dimension]] = {
     "kt": (1852 / 3600, (0, 1, -1, 0)), "kts": (1852 / 3600, (0, 1, -1, 0)),
     "g_0": (STANDARD_GRAVITY, (0, 1, -2, 0)), "g0": (STANDARD_GRAVITY, (0, 1, -2, 0)),
 }  # fmt: skip
-_MOMENT = re.compile(r"^(?!lbm$)([kmM]?N|daN|kgf?|kp|lbf?)(mm?|cm|ft|in)$")
+_PREFIXES = {
+    "G": 1e9,
+    "M": 1e6,
+    "k": 1e3,
+    "h": 1e2,
+    "da": 10.0,
+    "d": 0.1,
+    "c": 1e-2,
+    "m": 1e-3,
+    "µ": 1e-6,
+    "u": 1e-6,
+    "n": 1e-9,
+}
+_PREFIXED = {"N": tuple(_PREFIXES), "A": "kmµun", "V": "kmµu", "W": "km", "rad": "dcmµu", "deg": "dcm"}
+"""The prefixes of each symbol in everyday units; no MA and MW, which are labels of an axle and of a mean."""
+_BASE |= {p + u: (_PREFIXES[p] * _BASE[u][0], _BASE[u][1]) for u, before in _PREFIXED.items() for p in before}
+_MOMENT = re.compile(rf"^(?!lbm$)((?:{'|'.join(_PREFIXES)})?N|kgf?|kp|lbf?|ozf?)(mm?|cm|ft|in)$")
 """A force, or a mass for its weight, and the length of its lever, written together: Nm, daNm, kgm, lbft. lbm is a pound of mass."""
-_LEVER_FIRST = re.compile(r"^(ft|in)(lb[fs]?)$")
+_LEVER_FIRST = re.compile(r"^(ft|in)(lb[fs]?|ozf?)$")
 _TON = re.compile(r"\btons?\b", re.IGNORECASE)
 """Of 1000 kg, 2000 lb or 2240 lb: pint would silently mean the second."""
 _SUPERSCRIPTS = str.maketrans(
@@ -61,7 +79,7 @@ _TURNS_A_MINUTE = re.compile(
     re.IGNORECASE,
 )
 """What speeds of rotation are written in beside rad/s: 1/min is a turn a minute (DIN 1301-2), not a radian; U, tr, giri are turns."""
-_OF_TURNS = re.compile(r"\s*(?:[kM]?(?:Hz|hertz)|1\s*/\s*s(?:ec)?|s\s*\^?\s*-\s*1|s\s*⁻¹)\s*")
+_OF_TURNS = re.compile(r"\s*(?:(?:da|[a-zA-Zµ])?(?:Hz|hertz)|1\s*/\s*s(?:ec)?|s\s*\^?\s*-\s*1|s\s*⁻¹)\s*")
 """What could be radians or turns a second: DIN 1301-2 writes speeds of rotation in turns as 1/s."""
 _GRAVITY = (0, 1, -2, 0)
 _OF_GRAVITY = {"g": STANDARD_GRAVITY, "G": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1000}

@@ -513,17 +513,38 @@ def test_two_speeds_over_ground_of_other_sizes_are_a_question(size: float) -> No
 
 @pytest.mark.parametrize(
     ("name", "unit"),
-    [("drawbar_force_daN", "daN"), ("Zugkraft daN", "daN"), ("draft_kgf", "kgf")],
+    [
+        ("drawbar_force_daN", "daN"),
+        ("Zugkraft daN", "daN"),
+        ("draft_kgf", "kgf"),
+        ("Draft_hN", "hN"),
+        ("F_Zug/daN", "daN"),
+    ],
 )
 def test_a_unit_at_a_names_end_is_read_whole(name: str, unit: str) -> None:
     """force_daN was in N, surely, a tenth: its capital began a word."""
     proposal = _propose({name: 2000 + SPEED})["drawbar_force"]
     assert (proposal.unit, proposal.is_doubtful) == (unit, False)
+    assert GENERAL.read("Drawbar_ForcekN").unit == "kN"
+    assert GENERAL.read("hookN").unit == "N"  # no hoo in kN
 
 
-def test_a_torque_in_millinewton_metres_is_not_in_newton_metres() -> None:
-    """torque_rl_mNm was in N m, surely."""
-    assert _propose({"wheel_torque_rl_mNm": 2000 + SPEED})["drive_torque_rl"].unit == "mNm"
+@pytest.mark.parametrize("unit", ["mNm", "cNm", "hNm", "daN m", "daN*m", "kpm", "kgfcm", "ozin"])
+def test_a_torque_of_another_unit_is_not_in_newton_metres(unit: str) -> None:
+    """wheel_torque_rl_mNm was in N m, surely, and so were the others under Terragrip's own names."""
+    assert _propose({f"wheel_torque_rl_{unit}": 2 + SPEED})["drive_torque_rl"].unit == unit
+    (own,) = _propose({f"drive_torque_rl_{unit}": 2 + SPEED}).values()
+    assert own.unit == unit
+
+
+def test_a_wheel_has_no_unit_in_brackets_for_its_name() -> None:
+    """'drive_torque_rl [furlong N]' was the torque of a wheel 'rl [furlong N]' in N m, surely."""
+    assert all(p.is_doubtful for p in _propose({"drive_torque_rl [furlong N]": 2 + SPEED}).values())
+
+
+def test_a_pitch_in_mrad_is_not_in_degrees() -> None:
+    """pitch_mrad was in degrees by its size, surely: 17 times as steep."""
+    assert _propose({"pitch_mrad": 30 * SPEED})["pitch"].unit == "mrad"
 
 
 @pytest.mark.parametrize(("name", "unit"), [("motor_current_{}_mA", None), ("motor_current_{}", "mA")])

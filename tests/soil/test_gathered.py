@@ -145,3 +145,32 @@ def test_files_are_counted_and_the_fit_after_them(tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
     soils_of(files, AdhesionCurve(bootstrap=0), progress=lambda *done: seen.append(done))
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def _driven(path: Path, time: np.ndarray, speed: np.ndarray, std: float = 0.03) -> Path:
+    columns = {"ground_speed": speed, "ground_speed_std": np.full(len(time), std)}
+    about = {"method": "bank", "recording": {"time_zero": "2026-05-04T08:00:00+00:00"}}
+    Estimates(time, columns, np.zeros(len(time), dtype=np.uint8), {}, about, ()).write(path)
+    return path
+
+
+def test_files_of_one_drive_are_refused_and_drives_alike_are_not(tmp_path: Path) -> None:
+    """The same drive under two names, or as a part of a longer one, counted twice without a word."""
+    draws, time = np.random.default_rng(5), 0.1 * np.arange(600)
+    speed = np.interp(time, [0, 5, 50, 60], [0, 2, 2, 0])
+    noise, other = 0.03 * draws.standard_normal((2, 600))
+    whole = _driven(tmp_path / "whole.parquet", time, speed + noise)
+    part = _driven(tmp_path / "part.parquet", time[200:500], (speed + noise)[200:500])
+    again = _driven(tmp_path / "again.parquet", time, speed + noise + 0.01 * other)  # by another method
+    for second in (part, again):
+        with pytest.raises(InputError, match=f"{second.name}: holds the same drive as .*whole.parquet"):
+            distinct([whole, second])
+    convoy = _driven(tmp_path / "convoy.parquet", time, speed + other)
+    cruise = [
+        _driven(tmp_path / f"{k}.parquet", time, 2 + 0.2 * one, 0.1) for k, one in enumerate((noise, other))
+    ]
+    after = np.concatenate(
+        ((speed + noise)[500:], 2 + other[:500])
+    )  # a sixth of it once more, as hourly files overlap
+    overlap = _driven(tmp_path / "next.parquet", 50 + time, after)
+    assert len(distinct([whole, convoy, *cruise, overlap])) == 5

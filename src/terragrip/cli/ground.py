@@ -100,13 +100,13 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
 
 
 def _names(files: list[Path]) -> list[str]:
-    """A name for each drive: its file's; refuses a file given twice and two files of one name."""
+    """A name for each drive: its file's; refuses a drive given twice and two files of one name."""
+    from terragrip.soil.estimates import distinct
+
     seen: dict[str, Path] = {}
-    for path in files:
+    for path in distinct(files):
         other = seen.get(path.stem)
         if other is not None:
-            if other.resolve() == path.resolve():
-                raise InputError("is given twice", file=path, hint="name each run once")
             raise InputError(
                 f"has the same name as {other}", file=path, hint="rename one: runs are distinguished by name"
             )

@@ -138,8 +138,9 @@ def candidates_of(column: Column) -> list[Candidate]:
 def _by_name(column: Column) -> list[Candidate]:
     own = column.column
     # A wheel may have any name, but none that ends in a unit or says what is no measurement.
-    any_name = split_channel(own) is not None and own not in CHANNELS
-    if is_channel(own) and not (any_name and (column.name.unit or column.name.has("command", "statistic"))):
+    parts = None if own in CHANNELS else split_channel(own)
+    strays = column.name.unit or column.name.has("command", "statistic")
+    if is_channel(own) and not (parts and (strays or re.search(r"[^\w.-]", parts[1]))):
         return [Candidate(own, 1.0, "Terragrip's own name")]
     last = _last(own)
     if (

@@ -47,11 +47,18 @@ _CHINESE = re.compile("|".join(sorted(CHINESE, key=len, reverse=True)))
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
 _OF_MESSAGES = frozenset({"fix", "status", "state", "raw", "exp"})
 """Words that name messages, topics and experiments too, and then say nothing of each field in them."""
-_BEHIND = re.compile(
-    r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*"
-    r"|(?:da|[mkh])(?:A|Nm?|Pa|V|W))[>}]?$"
+_PREFIX = "(?:da|[GMkhdcmµμun])"
+_BEHIND = (
+    re.compile(
+        r"(?<=\w)(?:[\s_|{<,:]+|\s+[-/]\s*)(?:in\s+)?(?P<unit>[^\s_|{<>},:]*(?:[/°²·^]|\w-[12])[^\s_|{<>},:]*)[>}]?$"
+    ),
+    re.compile(
+        rf"(?<=\w)[\s_|{{<,:./-]+(?:in\s+)?(?P<unit>{_PREFIX}(?:[ANVW]|Pa|rad|deg)"
+        rf"|(?:{_PREFIX}N|kgf?|kp|ozf?|lbf)[ .*·-]?(?:mm?|cm|ft|in))[>}}]?$"
+    ),
 )
-"""A unit without brackets that is no word: n in 1/min, yaw rate <°/s>; or of two, if its capital began one: force_daN, I_mA."""
+"""A unit without brackets that is no word: n in 1/min, yaw rate <°/s>; or that comes apart as words do: force_daN, M_rl/cNm."""
+_GLUED = re.compile(r"(?<=[a-z])(?P<unit>(?:k|da)Nm?)$")
 _SOURCE = re.compile(r"(\([^()]*\)|\[[^\[\]]*\])\s*\*(\w+)$")
 """Vehicle Speed (km/h) *OBD: the source behind the unit."""
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]?\s*$")
@@ -200,8 +207,7 @@ class Vocabulary:
     def _parted(self, name: str) -> tuple[str, str | None]:
         """A name without the unit or remark at its end, and that unit; a word in brackets is the name's (``Speed (GPS)``)."""
         name = _SOURCE.sub(r"\2 \1", name)
-        behind = _BEHIND.search(name)
-        if behind is not None and is_common(behind["unit"]):
+        if behind := self._unit_behind(name):
             name = f"{name[: behind.start()]} [{behind['unit']}]"
         bracket = _BRACKET.search(name)
         if bracket is None or not name[: bracket.start()].strip():
@@ -213,6 +219,17 @@ class Vocabulary:
         if is_word or not 0 < len(text) <= 10 or re.search(r"\s\w{3,}", text):
             return name, None
         return name[: bracket.start()], None if plain == "ms^2" else unit  # m/s^2 misspelt, or not
+
+    def _unit_behind(self, name: str) -> re.Match[str] | None:
+        """A name's end that is a unit by what it looks like, in capitals no mega (DRAFT_MN, CURRENT_MA)."""
+        glued = _GLUED.search(name)
+        if glued is not None and not self.concepts_of(words_of(name[: glued.start() + 1])[-1]):  # hookN
+            return glued
+        found = (pattern.search(name) for pattern in _BEHIND)
+        return next(
+            (m for m in found if m and is_common(m["unit"]) and not (name.isupper() and m["unit"][0] == "M")),
+            None,
+        )
 
     def _unit_at_end(self, words: list[str]) -> tuple[str | None, int]:
         """The unit that a name ends in, and how many of its words say so; a name is not all unit."""

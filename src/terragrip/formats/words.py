@@ -95,6 +95,7 @@ UNIT_WORDS = {
     "millisecond": "ms", "microsecond": "us", "nanosecond": "ns",
     "millis": "ms", "ms": "ms", "milliseconds": "ms", "micros": "us", "us": "us", "microseconds": "us", "nanos": "ns",
     "ns": "ns", "nanoseconds": "ns", "nsec": "ns", "usec": "us", "msec": "ms", "a": "A", "amps": "A", "ma": "mA",
+    "mnm": "mNm", "dan": "daN", "danm": "daNm", "mrad": "mrad",
     "percent": "%", "pct": "%", "kg": "kg", "lbs": "lbs", "lbf": "lbf", "klbf": "klbf", "kgf": "kgf", "kip": "kip", "kips": "kip",
     **dict.fromkeys(("lbft", "ftlb", "ftlbs", "lbfft", "ftlbf"), "lbf ft"), **dict.fromkeys(("inlb", "inlbs", "lbin", "inlbf"), "lbf in"),
 }  # fmt: skip
