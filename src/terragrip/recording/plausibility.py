@@ -25,6 +25,7 @@ from terragrip.recording.forces import Courses, acceleration_warnings, balance_w
 from terragrip.recording.frozen import cut_warnings, frozen_warnings, overflow_warnings
 from terragrip.recording.held import measurable
 from terragrip.recording.inertial import inertial_warnings
+from terragrip.recording.interpolated import interpolated_warnings
 from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
@@ -288,6 +289,7 @@ _EACH = (
     Check("codes", lambda log: log.codes, needs_wheels=False),
     Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
     Check("vehicle", lambda log: size_warnings(log.any_vehicle), needs_wheels=False),
+    Check("interpolated", lambda log: interpolated_warnings(log.whole), _TIME, needs_wheels=False),
     Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),
 )
 _ALL = tuple(check.name for check in _EACH)

@@ -1,0 +1,67 @@
+"""Channels that a logger or a script drew on straight lines between fewer samples: sentences for the user, never errors.
+
+A measured value has noise of its own, so three in a row hardly ever lie on a straight line to their last digit. Of an interpolated
+channel all do, but for those at the samples, which are evenly spaced. What lies between is no measurement: its noise seems small.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terragrip.arrays import Floats
+from terragrip.recording.held import measured_part, quantum
+from terragrip.recording.ranks import median
+from terragrip.recording.schema import speed_names
+
+if TYPE_CHECKING:
+    from terragrip.recording.table import Recording
+
+_DIGITS = 2.1  # quanta that a change of two steps on a line may be rounded by
+_RESOLVED = 5.0  # times that, of the bends at the samples
+_STRAIGHT = 0.6  # of the rows whose value changes
+_FEWEST = 20  # samples
+_EVEN = 0.6  # share of their distances that is the usual one, to a row
+
+
+def interpolated_warnings(recording: Recording) -> list[str]:
+    """A sentence on speeds and torques that lie on straight lines between evenly spaced samples."""
+    wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]
+    found = {n: period_of_lines(recording.time, recording.channels[n]) for n in wanted}
+    known = {name: period for name, period in found.items() if period is not None}
+    if not known:
+        return []
+    each = ", ".join(f"{name} ({period:.2g} s)" for name, period in known.items())
+    return [
+        f"{each}: values lie on straight lines between samples that far apart, so they were interpolated: what lies between is no "
+        "measurement, and intervals of speed, slip and soil resistance are too narrow. Give the log as it was measured, without "
+        "interpolation (empty cells between the samples)."
+    ]
+
+
+def period_of_lines(time: Floats, values: Floats) -> float | None:
+    """Time [s] between the samples of an interpolated channel (n,); None of one that has noise of its own, or is too coarse to tell."""
+    time, values = measured_part(time, values)
+    if len(values) < 3 * _FEWEST:
+        return None
+    steps, usual = np.diff(values), median(np.diff(time))
+    even = np.abs(np.diff(time) - usual) < 0.05 * usual
+    seen = (steps[1:] != 0) & (steps[:-1] != 0) & even[1:] & even[:-1]
+    bend = np.abs(np.diff(steps))
+    rounding = _DIGITS * quantum(values) + 1e-9 * float(np.max(np.abs(values)))
+    # Where stamps are rounded, too, steps of one line are as long as their times.
+    bent = seen & (bend > rounding + 2e-3 * np.abs(steps[1:]))
+    rows = np.flatnonzero(bent)
+    rows = rows[np.diff(rows, prepend=-2) > 1]  # a sample between two rows bends twice
+    if len(rows) < _FEWEST or np.sum(seen & ~bent) < _STRAIGHT * seen.sum():
+        return None
+    apart = np.diff(rows)
+    length = median(apart)
+    if (
+        length < 3
+        or np.mean(np.abs(apart - length) <= 1) < _EVEN
+        or median(bend[bent]) < _RESOLVED * rounding
+    ):
+        return None
+    return float(length * usual)
