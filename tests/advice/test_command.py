@@ -63,6 +63,16 @@ def test_another_vehicles_file_is_refused_in_one_line(folder, capsys):
     assert not (folder / "advice.json").exists()
 
 
+def test_a_vehicle_of_the_same_wheels_and_another_mass_is_refused(folder, capsys):
+    """A robot's file for a tractor's estimates was advised on, without a word."""
+    estimates = drive(soil="hard")
+    estimates.about["vehicle"] = {**VEHICLE.to_dict(), "mass": 30 * VEHICLE.mass}
+    estimates.write("tractor.parquet")
+    code, _, error = called(capsys, "tractor.parquet", "--vehicle", "v.yaml")
+    assert (code, len(error.strip().splitlines())) == (2, 1)
+    assert f"the vehicle has {VEHICLE.mass:.4g} kg, that of the estimates {30 * VEHICLE.mass:.4g} kg" in error
+
+
 def test_no_such_file_is_one_line(folder, capsys):
     code, _, error = called(capsys, "nowhere.parquet", "--vehicle", "v.yaml")
     assert (code, len(error.strip().splitlines())) == (2, 1)

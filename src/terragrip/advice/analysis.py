@@ -49,6 +49,10 @@ NO_ROW = "no row moves, unflagged, with its adhesion known and vehicle and tool 
 CURVE_END, CURVE_POINTS = 0.4, 41
 
 
+_ANOTHER = 2.0
+"""Times the mass of a vehicle that it has with any ballast; a tank's load is logged as ``mass``."""
+
+
 def advise(
     tables: Sequence[Estimates], vehicle: Vehicle, soils: Mapping[str, Soil] | None = None
 ) -> tuple[dict[str, Advice], dict[str, float]]:
@@ -92,13 +96,17 @@ def advise_samples(
 
 
 def refuse_other_vehicle(estimates: Estimates, vehicle: Vehicle) -> None:
-    """InputError unless the table has the vehicle's driven wheels and axles, and one of them is driven."""
+    """InputError unless the table has the vehicle's driven wheels, axles and about its mass, and one of them is driven."""
     columns = [f"adhesion_{w}" for w in vehicle.driven_wheels] + [
         f"vertical_load_{a}" for a in vehicle.axle_names
     ]
     lacking = next((name for name in columns if name not in estimates.names), None)
     if lacking or not vehicle.driven.any():
         problem = f"the estimates have no {lacking}" if lacking else "the vehicle drives no wheel"
+        raise InputError(problem, hint="give the vehicle file that the log was estimated with")
+    own = (estimates.about.get("vehicle") or {}).get("mass", vehicle.mass)
+    if not own / _ANOTHER < vehicle.mass < own * _ANOTHER:
+        problem = f"the vehicle has {vehicle.mass:.4g} kg, that of the estimates {own:.4g} kg"
         raise InputError(problem, hint="give the vehicle file that the log was estimated with")
 
 
