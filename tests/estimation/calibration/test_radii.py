@@ -47,7 +47,7 @@ def test_the_radius_comes_out_with_the_slip_taken_off(drive: Make, vehicle: Vehi
 
 def test_intervals_of_the_radius_hold(drive: Make, vehicle: Vehicle) -> None:
     z = []
-    for seed in range(2):
+    for seed in range(5):
         logs = [
             free_pass(drive, 0.197, seed, noise=1.0),
             drive(120, radius=0.197, slip=(0.0, 0.25), seed=seed, noise=1.0, patches=0.05),
