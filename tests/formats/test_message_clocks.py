@@ -56,6 +56,17 @@ def test_stamps_that_wander_are_left_out_and_said(stamps: np.ndarray) -> None:
     assert notes[0].startswith("/odom: its stamps drift by ")
 
 
+def test_simulated_time_that_begins_at_zero_is_said_to_run_apart() -> None:
+    """A simulation at half speed: its first stamp, 0, counted as none, so that all were dropped without a word."""
+    _, notes = topic(0.5 * AFTER, SENT)
+    assert "They run 0.5 times as fast, as simulated time does" in notes[0]
+    time, notes = topic(AFTER, SENT)  # at full speed
+    np.testing.assert_allclose(time, SENT, atol=1e-3)
+    assert "stamped" in notes[0]
+    _, (wandered,) = topic(SENT + 18.0 * (AFTER > 30), SENT)
+    assert "times as fast" not in wandered
+
+
 def test_messages_that_waited_on_their_way_keep_their_stamps() -> None:
     """A network that was away for 6 s: what was SENT meanwhile comes at once."""
     late = (AFTER > 20) & (AFTER < 26)

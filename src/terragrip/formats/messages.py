@@ -27,6 +27,8 @@ _BLOCK = 1000  # messages that are read or left out together, where a log is loo
 _OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock is another one
 _TRIED = 20  # messages without a wanted field after which a topic has none: the first may be empty
 _QUICKEST = 0.05  # quantile of the delay that counts as no delay, and share of stamps that may be far from it
+_STAMPED = 0.9  # of a topic's messages
+_PACE = 0.005  # of a clock's own, that no quartz is off by
 _BURST = 0.1  # of the time between two stamps: receipts that are closer came late, together
 _NUMBER = (bool, int, float, np.number, np.bool_)
 _PLAIN = frozenset({bool, int, float, str})
@@ -169,15 +171,27 @@ class Topic:
     def _time(self) -> tuple[np.ndarray, list[str]]:
         """When the values were measured: the sender's stamps where there are, on the receiver's clock."""
         receipts, stamps = np.frombuffer(self._receipts), np.frombuffer(self._stamps)
-        if not len(stamps) or not np.isfinite(stamps).all():
+        known = np.isfinite(stamps)
+        if not known.any() or known.mean() < _STAMPED:
             return receipts, []
         delay = receipts - stamps
-        typical = float(np.median(delay))
+        typical = float(np.median(delay[known]))
+        delay = np.where(known, delay, typical)
+        stamps = np.where(
+            known, stamps, receipts - typical
+        )  # a stamp of 0 is none, or where simulated time begins
         far = np.abs(delay - typical) > _OTHER_CLOCK
         if far.mean() > _QUICKEST and not _in_bursts(receipts, stamps):
             apart = float(np.ptp(delay))
+            pace, start = np.polyfit(receipts[known] - receipts[0], stamps[known], 1)
+            rest = stamps[known] - pace * (receipts[known] - receipts[0]) - start
+            simulated = (
+                f" They run {pace:.3g} times as fast, as simulated time does: speeds and accelerations need it, so record with "
+                "'ros2 bag record --use-sim-time'."
+            )
             return receipts, [
                 f"{self.name}: its stamps drift by {apart:.3g} s against the recorder's clock; the times of receipt are used."
+                + simulated * bool(np.ptp(rest) < _OTHER_CLOCK and abs(pace - 1) > _PACE)
             ]
         if abs(typical) <= _OTHER_CLOCK:
             return stamps, []
