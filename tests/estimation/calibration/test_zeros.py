@@ -97,6 +97,19 @@ def test_stops_that_read_alike_outvote_stops_that_hold(drive: Make, vehicle: Veh
         assert len(quantity.evidence) == 4
 
 
+def test_stops_of_which_few_agree_are_off_by_what_the_others_differ_by(drive: Make, vehicle: Vehicle) -> None:
+    """Seven stops of 5 s, motors that hold on slopes that nothing measures: two read alike, 1.2 N m off, to .03 N m."""
+    holds = (-1.5, -0.6, 0.5, 1.2, 1.2, 2.0, 2.9)
+    stops = [
+        drive(40, offset=OFFSET, standing=5, noise=1.0, seed=k, held_torque=h) for k, h in enumerate(holds)
+    ]
+    unsure = Vehicle.from_dict({**vehicle.to_dict(), "uncertainty": {"drive_torque_offset": 2.0}})
+    result = calibrate(stops, unsure)
+    for wheel, offset in zip(WHEELS, OFFSET, strict=True):
+        quantity = result[f"drive_torque_offset {wheel}"]
+        assert abs(quantity.value - offset) < 2 * quantity.std
+
+
 def test_motors_that_hold_the_vehicle_on_slopes_show_no_zero(drive: Make, vehicle: Vehicle) -> None:
     """Three stops on slopes, of which two read alike, by chance: 140 kg times g sin(pitch), by a speed control; then one without."""
     pitches = (0.02, -0.015, -0.0152)

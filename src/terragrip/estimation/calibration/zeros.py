@@ -195,12 +195,19 @@ def torque_zeros(
     if not calm:
         means = [stop_means(torque, spell) for spell in stops]
         return [], _held_by(wheels, means, allowed) or [Unknown(key, _ONE_SHORT_STOP)]
+    scatter = np.zeros(len(driven))
+    read = np.array([stop_means(torque, spell) for spell in stops if spell not in holding])
+    read = read[np.all(np.abs(read) <= allowed, axis=1)]
+    longest = max(spell.stop - spell.start for spell in calm) * windows.length
+    # Short ones may be alike by chance where motors hold the vehicle.
+    if len(read) >= 2 * len(calm) and longest < 2 * _ALONE:
+        scatter = np.std(read, axis=0, ddof=1)
     entry = evidence(windows, rows_of(calm), sources, windows.torque_count)
     sentence = "mean of the stops that agree; assumes that nothing drives or holds the wheels there"
     quantities = []
-    for wheel, values in zip(wheels, torque.T, strict=True):
+    for wheel, values, apart in zip(wheels, torque.T, scatter, strict=True):
         value, error = spell_mean(values, calm, windows.torque_count, noise)
-        error = float(np.hypot(error, level))
+        error = float(np.linalg.norm([error, level, apart]))
         quantities.append(Quantity(key, value, error, "N m", entry, sentence, wheel=wheel))
     return quantities, []
 
