@@ -87,7 +87,7 @@ void tgi_turn(tg_estimator *e)
 }
 
 /* At standstill the low-passed speeds are the outputs; one that is no longer measured is that of a vehicle that stands. Adhesion is held
- * until the torques surely contradict it: wheels that show no slow turn may start unseen. Before the first motion it follows from them. */
+ * until the torques surely ask for more: wheels that show no slow turn may start unseen. Before the first motion it follows from them. */
 void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
 {
     const tg_settings *s = &e->settings;
@@ -104,7 +104,7 @@ void tgi_rest(tg_estimator *e, const tg_drive *drive, double time)
     e->by_torque |= !(e->distance > 0);
     for (int32_t i = 0; i < n; i++) {
         const tg_real arm = s->machine.radius[i] * drive->load[i], held = e->belief.x[i], by_torque = e->torque[i].count ? d * e->torque[i].value / arm : 0;
-        const tg_real beyond = tgi_fabs(by_torque - held) - s->machine.tire_rolling_resistance; /* which opposes any motion */
+        const tg_real beyond = tgi_fabs(by_torque) - tgi_fabs(held) - s->machine.tire_rolling_resistance; /* which opposes any motion */
         const tg_real variance = tgi_square(s->noise[TG_DRIVE_TORQUE + i] / arm) + e->belief.P[i * (tgi_stride(n) + 1)];
         const int32_t possible = tgi_fabs(by_torque) <= 1;
         e->by_torque |= possible && beyond > 0 && tgi_square(beyond) > tgi_square(s->tuned.spike) * variance;

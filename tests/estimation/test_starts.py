@@ -155,3 +155,21 @@ def test_a_start_that_no_speed_shows_yet_is_in_the_torques(rate: float):
         assert np.sqrt(np.mean(error[starts] ** 2)) < 0.08
         rest = starts & (found["event"] == "standstill")
         assert (error < 1.96 * found[f"adhesion_{wheel}_std"])[rest].all()
+
+
+@pytest.mark.parametrize("left", [0.0, 0.5, -0.5])
+def test_at_rest_adhesion_is_held_while_no_torque_asks_for_more(left: float):
+    """A stop on a slope, where motors hold and then brakes do: friction has no sign there (physics.md 2)."""
+    made = drive(14.0, rate=50.0, speed=lambda t: np.clip(7 - t, 0, 1), slip=lambda t: 0.1 + 0 * t)
+    time, log = made.recording.time, made.recording
+    torques = {n: v for n, v in log.channels.items() if n.startswith("drive_torque")}
+    before = {n: v[np.searchsorted(time, 5.5)] for n, v in torques.items()}
+    held = {
+        n: np.where(time > 9, left * before[n], np.where(time > 6, before[n], v)) for n, v in torques.items()
+    }
+    stands = {n: np.where(time > 7, 0.0, v) for n, v in log.channels.items() if "speed" in n}
+    found = estimate(log.with_channels(**held, **stands), robot())
+    rest = found["event"] == "standstill"
+    assert time[rest][0] < 8
+    for wheel in WHEELS:
+        assert np.ptp(found[f"adhesion_{wheel}"][rest & (time > 8.5)]) == 0
