@@ -526,7 +526,8 @@ def test_a_unit_at_a_names_end_is_read_whole(name: str, unit: str) -> None:
     proposal = _propose({name: 2000 + SPEED})["drawbar_force"]
     assert (proposal.unit, proposal.is_doubtful) == (unit, False)
     assert GENERAL.read("Drawbar_ForcekN").unit == "kN"
-    assert GENERAL.read("hookN").unit == "N"  # no hoo in kN
+    for name in ("hookN", "DrawbarPeakN", "pull_linkN"):
+        assert GENERAL.read(name).unit == "N"  # no hoo, Pea, lin in kN
 
 
 @pytest.mark.parametrize("unit", ["mNm", "cNm", "hNm", "daN m", "daN*m", "kpm", "kgfcm", "ozin"])

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.estimation.drives import drive, robot
 
 from terragrip.errors import InputError
-from terragrip.estimation import Estimates
+from terragrip.estimation import Estimates, estimate
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BinSettings
 from terragrip.soil.estimates import (
@@ -174,3 +175,17 @@ def test_files_of_one_drive_are_refused_and_drives_alike_are_not(tmp_path: Path)
     )  # a sixth of it once more, as hourly files overlap
     overlap = _driven(tmp_path / "next.parquet", 50 + time, after)
     assert len(distinct([whole, convoy, *cruise, overlap])) == 5
+
+
+def test_simulated_runs_of_one_ground_speed_whose_wheels_slip_otherwise_are_two(tmp_path: Path) -> None:
+    """Without noise, from 0 on: runs on two soils with one speed command were refused as one."""
+    runs = [
+        drive(60, rate=20, noise=0, speed=lambda t: 1 + 0.3 * np.sin(t / 3), slip=lambda t, s=s: s + 0 * t)
+        for s in (0.05, 0.1)
+    ]
+    files = [tmp_path / f"{k}.parquet" for k in range(3)]
+    for file, run, method in zip(files, (runs[0], runs[1], runs[0]), ("bank", "bank", "kalman"), strict=True):
+        estimate(run.recording, robot(), method=method).write(file)
+    assert distinct(files[:2]) == files[:2]
+    with pytest.raises(InputError, match="holds the same drive"):
+        distinct([files[0], files[2]])

@@ -223,7 +223,7 @@ class Vocabulary:
     def _unit_behind(self, name: str) -> re.Match[str] | None:
         """A name's end that is a unit by what it looks like, in capitals no mega (DRAFT_MN, CURRENT_MA)."""
         glued = _GLUED.search(name)
-        if glued is not None and not self.concepts_of(words_of(name[: glued.start() + 1])[-1]):  # hookN
+        if glued is not None and self.concepts_of(words_of(name[: glued.start()])[-1]):  # no hookN, PeakN
             return glued
         found = (pattern.search(name) for pattern in _BEHIND)
         return next(

@@ -56,8 +56,8 @@ _SHARED = 0.5
 """Of the shorter drive's rows in another's time, from which on it is asked whether both are one."""
 _ROWS = 20
 _WITHIN = 0.8
-"""Standard deviations that two estimates of one measured speed differ by (.4 by method, .65 smoothed and not); of two drives with one
-command at least 1.3 (root 2, by theory; simulation, 435 pairs)."""
+"""Standard deviations that two estimates of one measured speed differ by (.4 by method, .65 smoothed and not), by the larger one; of two
+drives with one command at least 1.3 (root 2, by theory; simulation, 435 pairs), one of them smoothed at least 1."""
 _CHANGES = (
     0.5  # correlation of their changes from row to row: noise, at one speed, that two drives do not share
 )
@@ -73,9 +73,9 @@ def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
         seen.add(path.resolve())
     drives: list[tuple[Path, Floats]] = []
     for path in filter(Path.exists, paths if len(paths) > 1 else ()):  # the reader names one that is missing
-        drive = _speeds(path)
+        drive = _speeds(path, "ground_speed")
         for other, before in drives:
-            if _is_same(before, drive):
+            if _is_same(before, drive) and _turned_alike(other, path):
                 problem, hint = (
                     f"holds the same drive as {other}",
                     "leave one out: its rows would count twice",
@@ -85,13 +85,13 @@ def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
     return paths
 
 
-def _speeds(path: Path) -> Floats:
-    """Clock time (from 0 without a clock), ground speed and its standard deviation (3, n) where known; none of a table without them."""
+def _speeds(path: Path, name: str) -> Floats:
+    """Clock time (from 0 without a clock), a speed and its standard deviation (3, n) where known; none of a table without them."""
     import pyarrow.parquet as pq
 
     zero = (Estimates.read_about(path).get("recording") or {}).get("time_zero")
     start = 0.0 if zero is None else datetime.fromisoformat(zero).timestamp()
-    columns = ["time", "ground_speed", "ground_speed_std"]
+    columns = ["time", name, f"{name}_std"]
     if not set(columns) <= set(pq.read_schema(path).names):
         return np.empty((3, 0))
     table = pq.read_table(path, columns=columns)
@@ -100,21 +100,34 @@ def _speeds(path: Path) -> Floats:
     return rows[:, np.isfinite(rows).all(axis=0) & (np.abs(rows[1]) > 3 * rows[2])]
 
 
-def _is_same(first: Floats, second: Floats) -> bool:
+def _turned_alike(first: Path, second: Path) -> bool:
+    """Whether the wheels turned alike, too: simulated runs without noise may have one ground speed on two soils.
+
+    Twice as far apart as ground speeds may be: the algebraic method's low-passed speeds are 1.1 SDs from a filter's.
+    """
+    import pyarrow.parquet as pq
+
+    both = set(pq.read_schema(first).names) & set(pq.read_schema(second).names)
+    wheels = [name for name in both if name.startswith("wheel_speed_") and f"{name}_std" in both]
+    return all(_is_same(_speeds(first, name), _speeds(second, name), 2 * _WITHIN) for name in wheels)
+
+
+def _is_same(first: Floats, second: Floats, within: float = _WITHIN) -> bool:
     """Whether the ``second``'s speed (3, n) is an estimate of what was measured in the ``first`` (3, m), too, noise and all."""
     if min(first.shape[1], second.shape[1]) < _ROWS:
         return False
-    inside = second[:, (second[0] >= first[0, 0]) & (second[0] <= first[0, -1])]
+    inside = second[:, slice(*np.searchsorted(second[0], [first[0, 0], np.nextafter(first[0, -1], np.inf)]))]
     if inside.shape[1] < max(_ROWS, _SHARED * min(first.shape[1], second.shape[1])):
         return False
     for rows in (inside[:, :: max(1, inside.shape[1] // _ROWS)], inside):  # a few first: most pairs end there
-        off = (rows[1] - np.interp(rows[0], first[0], first[1])) / rows[2]
-        if np.sqrt(np.mean(off**2)) > 1.25 * _WITHIN:
+        before, std = (np.interp(rows[0], first[0], of) for of in first[1:])
+        off = np.sqrt(np.mean(((rows[1] - before) / np.maximum(rows[2], std)) ** 2))
+        if off > 1.25 * within:
             return False
-    changes = np.diff(inside[1]), np.diff(np.interp(inside[0], first[0], first[1]))
+    changes = np.diff(inside[1]), np.diff(before)
     if min(np.std(changes[0]), np.std(changes[1])) == 0:
         return False
-    return bool(np.sqrt(np.mean(off**2)) < _WITHIN and np.corrcoef(*changes)[0, 1] > _CHANGES)
+    return bool(off < within and np.corrcoef(*changes)[0, 1] > _CHANGES)
 
 
 @dataclass
