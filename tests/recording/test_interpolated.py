@@ -31,6 +31,7 @@ def test_a_speed_on_straight_lines_is_named(digits: int, late: float) -> None:
         np.round(SPEED, 2),
         np.round(1.5 + np.sin(TIME / 5), 2),  # coarse
         1.5 + np.sin(TIME / 5),  # without noise, as of a filter
+        np.round(1.5 + 0.2 * np.sin(TIME / 50), 8),  # slowly: its bends come and go with the rounding
         SPEED[::20].repeat(20),  # held
         np.convolve(SPEED, np.ones(20) / 20, mode="same"),
         np.interp(TIME, [0, 40, 80, 120], [0, 2, 2, 0]),  # a command

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from terragrip.recording.table import Recording
 
 _DIGITS = 2.1  # quanta that a change of two steps on a line may be rounded by
-_RESOLVED = 5.0  # times that, of the bends at the samples
+_RESOLVED = 5.0  # times what counts as straight, of the bends at the samples
 _STRAIGHT = 0.6  # of the rows whose value changes
 _FEWEST = 20  # samples
 _EVEN = 0.6  # share of their distances that is the usual one, to a row
@@ -51,7 +51,8 @@ def period_of_lines(time: Floats, values: Floats) -> float | None:
     bend = np.abs(np.diff(steps))
     rounding = _DIGITS * quantum(values) + 1e-9 * float(np.max(np.abs(values)))
     # Where stamps are rounded, too, steps of one line are as long as their times.
-    bent = seen & (bend > rounding + 2e-3 * np.abs(steps[1:]))
+    straight = rounding + 2e-3 * np.abs(steps[1:])
+    bent = seen & (bend > straight)
     rows = np.flatnonzero(bent)
     rows = rows[np.diff(rows, prepend=-2) > 1]  # a sample between two rows bends twice
     if len(rows) < _FEWEST or np.sum(seen & ~bent) < _STRAIGHT * seen.sum():
@@ -61,7 +62,7 @@ def period_of_lines(time: Floats, values: Floats) -> float | None:
     if (
         length < 3
         or np.mean(np.abs(apart - length) <= 1) < _EVEN
-        or median(bend[bent]) < _RESOLVED * rounding
+        or median(bend[bent] / straight[bent]) < _RESOLVED
     ):
         return None
     return float(length * usual)
