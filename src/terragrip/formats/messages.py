@@ -28,7 +28,7 @@ _OTHER_CLOCK = 1.0  # s between stamp and receipt from which the sender's clock 
 _TRIED = 20  # messages without a wanted field after which a topic has none: the first may be empty
 _QUICKEST = 0.05  # quantile of the delay that counts as no delay, and share of stamps that may be far from it
 _STAMPED = 0.9  # of a topic's messages
-_PACE = 0.005  # of a clock's own, that no quartz is off by
+_PACE = 0.005  # of a clock's own, that no quartz is off by; nor does one run that makes no more
 _BURST = 0.1  # of the time between two stamps: receipts that are closer came late, together
 _NUMBER = (bool, int, float, np.number, np.bool_)
 _PLAIN = frozenset({bool, int, float, str})
@@ -185,13 +185,14 @@ class Topic:
             apart = float(np.ptp(delay))
             pace, start = np.polyfit(receipts[known] - receipts[0], stamps[known], 1)
             rest = stamps[known] - pace * (receipts[known] - receipts[0]) - start
+            runs = pace > _PACE and abs(pace - 1) > _PACE
             simulated = (
                 f" They run {pace:.3g} times as fast, as simulated time does: speeds and accelerations need it, so record with "
                 "'ros2 bag record --use-sim-time'."
             )
             return receipts, [
                 f"{self.name}: its stamps drift by {apart:.3g} s against the recorder's clock; the times of receipt are used."
-                + simulated * bool(np.ptp(rest) < _OTHER_CLOCK and abs(pace - 1) > _PACE)
+                + simulated * bool(runs and np.ptp(rest) < _OTHER_CLOCK)
             ]
         if abs(typical) <= _OTHER_CLOCK:
             return stamps, []
