@@ -221,13 +221,13 @@ class Vocabulary:
         return name[: bracket.start()], None if plain == "ms^2" else unit  # m/s^2 misspelt, or not
 
     def _unit_behind(self, name: str) -> re.Match[str] | None:
-        """A name's end that is a unit by what it looks like, in capitals no mega (DRAFT_MN, CURRENT_MA)."""
+        """A name's end that is written as a unit, in capitals no mega (DRAFT_MN, CURRENT_MA)."""
         glued = _GLUED.search(name)
         if glued is not None and self.concepts_of(words_of(name[: glued.start()])[-1]):  # no hookN, PeakN
             return glued
-        found = (pattern.search(name) for pattern in _BEHIND)
+        ends = (pattern.search(name) for pattern in _BEHIND)
         return next(
-            (m for m in found if m and is_common(m["unit"]) and not (name.isupper() and m["unit"][0] == "M")),
+            (m for m in ends if m and is_common(m["unit"]) and not (name.isupper() and m["unit"][0] == "M")),
             None,
         )
 

@@ -28,8 +28,8 @@ _EVEN = 0.6  # share of their distances that is the usual one, to a row
 def interpolated_warnings(recording: Recording) -> list[str]:
     """A sentence on speeds and torques that lie on straight lines between evenly spaced samples."""
     wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]
-    found = {n: period_of_lines(recording.time, recording.channels[n]) for n in wanted}
-    known = {name: period for name, period in found.items() if period is not None}
+    periods = {n: period_of_lines(recording.time, recording.channels[n]) for n in wanted}
+    known = {name: period for name, period in periods.items() if period is not None}
     if not known:
         return []
     each = ", ".join(f"{name} ({period:.2g} s)" for name, period in known.items())
