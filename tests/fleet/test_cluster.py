@@ -15,7 +15,7 @@ import pytest
 from fsspec.implementations.memory import MemoryFileSystem
 
 from terragrip.errors import InputError
-from terragrip.fleet.cluster import Pool
+from terragrip.fleet.cluster import Pool, workers_at
 from terragrip.fleet.logs import FleetLog
 from terragrip.fleet.store import Store
 from terragrip.fleet.task import Outcome
@@ -102,6 +102,18 @@ def test_where_no_worker_comes_back_the_logs_of_the_last_are_named(monkeypatch: 
             reasons[one.log] = one.reason
     assert {name for name, reason in reasons.items() if not reason} == {"drive0.csv", "drive2.csv"}
     assert "memory" in reasons["drive1.csv"]
+
+
+def test_workers_here_have_the_memory_that_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without it a log that needs more takes the whole machine's: test_faults.py."""
+    distributed = pytest.importorskip("distributed", reason="needs terragrip[fleet]")
+
+    def cluster(**words: object) -> None:
+        raise InputError(f"{words['n_workers']} workers, {words['memory_limit']} bytes")
+
+    monkeypatch.setattr(distributed, "LocalCluster", cluster)
+    with pytest.raises(InputError, match="2 workers, 420000000 bytes"), workers_at(None, 2, "420MB"):
+        pass
 
 
 class Refusing(MemoryFileSystem):

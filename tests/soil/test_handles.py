@@ -55,7 +55,6 @@ def test_a_curve_that_cannot_follow_is_the_nearest() -> None:
     assert float(model.value(0.6, after)) == pytest.approx(0.88 * (1 - np.exp(-4.5)), abs=0.005)
 
 
-@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", [name for name in CURVES if name != "brixius"])
 def test_a_rise_that_is_dragged_past_an_axis_or_the_peak_keeps_its_way_and_the_curves_height(
     name: str,

@@ -272,6 +272,7 @@ def drawbar_zero(
         taut = f"at standstill it reads {least:.1f} N, so the bar seems to be under tension"
         why = taut if abs(least) > allowed else _ONE_SHORT_STOP
     stops = resting(windows, bar, stops, windows.drawbar_count, noise, np.array([allowed]))
+    alone = len(stops) == 1
     if not stops:
         stops = _free_passes(windows, noise)
         sentence = "mean over driving with a constant drawbar force; assumes that nothing is towed there"
@@ -280,11 +281,11 @@ def drawbar_zero(
     value, error = spell_mean(windows.drawbar, stops, windows.drawbar_count, noise)
     if not abs(value) <= allowed:
         return [], [Unknown(key, why)]
-    if len(stops) == 1 and sentence.startswith("mean of the stops"):
+    if alone:
         # Nothing tells a bar's zero from a pull that the motors hold there.
         thrust = np.nansum(windows.torque[:, vehicle.driven] / vehicle.wheel_radius[vehicle.driven], axis=1)
-        held, noise = spell_mean(thrust, stops, windows.torque_count, 0.0)
-        error = float(np.hypot(error, held)) if abs(held) > _ALIKE * noise else error
+        held, scatter = spell_mean(thrust, stops, windows.torque_count, 0.0)
+        error = float(np.hypot(error, held)) if abs(held) > _ALIKE * scatter else error
         sentence = "mean of the one stop; assumes that the bar is slack there, to what the torques read"
     entry = evidence(windows, rows_of(stops), sources, windows.drawbar_count)
     return [Quantity(key, value, error, "N", entry, sentence)], []
