@@ -36,7 +36,7 @@ def command(
     from terragrip.advice.analysis import advise
     from terragrip.advice.result import words, write
     from terragrip.estimation import Estimates
-    from terragrip.soil.estimates import distinct
+    from terragrip.soil.estimates import distinct, repeated
     from terragrip.soil.library import SoilLibrary
     from terragrip.vehicle import Vehicle
 
@@ -57,6 +57,6 @@ def command(
             (path.stem, table.notes) for path, table in zip(estimates, tables, strict=True)
         ):
             print(with_page(doubt))
-        print(words(advice))
+        print(*repeated(estimates), words(advice), sep="\n")
         if target:
             print(f"Written to {output}")

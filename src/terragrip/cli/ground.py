@@ -56,6 +56,7 @@ def command(
     from terragrip.estimation import Estimates
     from terragrip.ground.analysis import Settings, analyse
     from terragrip.ground.result import write
+    from terragrip.soil.estimates import repeated
     from terragrip.soil.library import SoilLibrary
     from terragrip.soil.signature import signature_in
 
@@ -85,7 +86,7 @@ def command(
             step(number, len(estimates), run)
     write(grounds, target, {"library": None if library is None else library.name})
     if not quiet:
-        print(summary(grounds))
+        print(*repeated(estimates), summary(grounds), sep="\n")
         print(f"Written to {output}" + (f" and {table}" if table else ""))
 
 
@@ -100,7 +101,7 @@ def _signals(given: list[str] | None) -> tuple[str, ...]:
 
 
 def _names(files: list[Path]) -> list[str]:
-    """A name for each drive: its file's; refuses a drive given twice and two files of one name."""
+    """A name for each drive: its file's; refuses a file given twice and two files of one name."""
     from terragrip.soil.estimates import distinct
 
     seen: dict[str, Path] = {}

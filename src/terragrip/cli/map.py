@@ -73,7 +73,7 @@ def command(
     from terragrip.maps.layers import LAYERS
     from terragrip.maps.soils import sections_by_run
     from terragrip.maps.writing import require_suffix
-    from terragrip.soil.estimates import distinct
+    from terragrip.soil.estimates import distinct, repeated
     from terragrip.soil.library import SoilLibrary
 
     target = check_file(output, [*inputs, soils, ground])
@@ -107,7 +107,7 @@ def command(
         step(steps - 1, steps)
         write_map(made, target, layer)
     if not quiet:
-        print(*map(with_page, doubts_of(noted)), summary(made), sep="\n")
+        print(*repeated(files), *map(with_page, doubts_of(noted)), summary(made), sep="\n")
         print(f"Written to {output}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,7 +38,7 @@ from terragrip.report.ground_sections import WARNINGS
 from terragrip.report.page import Page, Section, Table, names, number
 from terragrip.report.runs import Run, label_stretches
 from terragrip.report.scores import Comparison, compare
-from terragrip.soil.estimates import GatheredRuns, distinct
+from terragrip.soil.estimates import GatheredRuns, distinct, repeated
 from terragrip.soil.known import known_soils
 from terragrip.soil.learn import Campaign
 from terragrip.soil.library import SoilLibrary
@@ -131,7 +131,7 @@ def report_of(
         f"{summary.extent([one.driven for one in summaries])}, estimated by {names(sorted({one.method for one in summaries}))}. "
         f"Drawn over time: {names([run.name for run in together])}.",
         (
-            _summarised(read, main, grounds, campaign),
+            _summarised(read, main, grounds, campaign, repeated(paths)),
             path.section(together, [_labels(run) for run in together]),
             *(_sections(main, together, campaign) if main.has_adhesion else _of_slip(together)),
             read.advice.section(),
@@ -219,13 +219,15 @@ def _lacks(run: Run) -> list[str]:
     return found
 
 
-def _summarised(read: _Gathered, main: Run, grounds: Sequence[Ground], campaign: Campaign) -> Section:
-    """The summary on top."""
+def _summarised(
+    read: _Gathered, main: Run, grounds: Sequence[Ground], campaign: Campaign, doubts: Sequence[str]
+) -> Section:
+    """The summary on top, which ends with the ``doubts``."""
     known = {ground.run for ground in grounds}
     every = [event.kind for ground in grounds for event in ground.events]
     every += [event.kind for run, mine in read.events.items() if run not in known for event in mine]
     missing = [*read.missing, *(f"{name} could not be fitted" for name in campaign.not_fitted)]
-    return summary.section(
+    section = summary.section(
         [one.driven for one in read.summaries],
         read.blocks,
         soil_sections.curves_of_all(campaign),
@@ -233,6 +235,7 @@ def _summarised(read: _Gathered, main: Run, grounds: Sequence[Ground], campaign:
         {kind: every.count(kind) for kind in WARNINGS if kind in every},
         missing,
     )
+    return replace(section, prose=(*section.prose, *doubts))
 
 
 def _worked(blocks: Sequence[Blocks]) -> Iterator[Section]:

@@ -49,7 +49,7 @@ def soils_of(
     campaign = gathered.learn(curve, bins)
     if progress:
         progress(len(paths) + 1, len(paths) + 1)
-    return campaign
+    return replace(campaign, words=(*repeated(paths), *campaign.words))
 
 
 _SHARED = 0.5
@@ -64,25 +64,30 @@ _CHANGES = (
 
 
 def distinct(files: Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """The files as paths. Raises InputError on a file given twice, and on files of one drive: it would count twice."""
+    """The files as paths. Raises InputError on a file given twice."""
     paths = [Path(file) for file in files]
     seen: set[Path] = set()
     for path in paths:
         if path.resolve() in seen:
             raise InputError("is given twice", file=path, hint="name each run once")
         seen.add(path.resolve())
-    drives: list[tuple[Path, Floats]] = []
-    for path in filter(Path.exists, paths if len(paths) > 1 else ()):  # the reader names one that is missing
-        drive = _speeds(path, "ground_speed")
-        for other, before in drives:
-            if _is_same(before, drive) and _turned_alike(other, path):
-                problem, hint = (
-                    f"holds the same drive as {other}",
-                    "leave one out: its rows would count twice",
-                )
-                raise InputError(problem, file=path, hint=hint)
-        drives.append((path, drive))
     return paths
+
+
+def repeated(paths: Sequence[Path]) -> list[str]:
+    """A sentence on each file of a drive that one before it holds, too: by another name or method, smoothed, or a part of it."""
+    drives: list[tuple[Path, Floats]] = []
+    words = []
+    for path in paths if len(paths) > 1 else ():
+        drive = _speeds(path, "ground_speed")
+        same = (one for one, before in drives if _is_same(before, drive) and _turned_alike(one, path))
+        other = next(same, None)
+        if other is not None:
+            words.append(
+                f"{path.name} holds the same drive as {other.name}, so its rows count twice: leave one out."
+            )
+        drives.append((path, drive))
+    return words
 
 
 def _speeds(path: Path, name: str) -> Floats:
