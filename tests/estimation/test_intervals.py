@@ -53,7 +53,6 @@ def held(scenario: str, missing: tuple[str, ...] = ()) -> dict[str, dict[str, ND
     return {n: {soil: np.concatenate(parts) for soil, parts in by.items()} for n, by in out.items()}
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("scenario", ["accuracy-clean", "accuracy-faults"])
 @pytest.mark.parametrize("missing", [(), SENSED[:3], SENSED], ids=["all", "no accelerometer", "nor pitch"])
 def test_intervals_hold_the_truth(scenario: str, missing: tuple[str, ...]) -> None:
