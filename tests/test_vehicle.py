@@ -299,6 +299,7 @@ def test_the_page_on_the_vehicle_file_holds_a_file_that_loads_and_names_every_ke
         ({"pivots": True}, {"pivots": False}, {"articulated": True}, [True, False]),
         ({"pivots": True}, {}, {"articulated": True}, [True, False]),  # else nothing kept it upright
         ({"steered": True}, {"pivots": True}, {}, [False, True]),
+        ({"steered": True}, {"wheels": ["r"]}, {}, [False, False]),  # a single wheel behind holds no roll
     ],
 )
 def test_an_axle_that_steers_and_the_last_of_a_machine_that_bends_pivot_unless_the_file_says_no(

@@ -197,15 +197,13 @@ def check_pivots(axles: dict[str, Axle]) -> None:
 
 
 def pivoting_axles(axles: dict[str, Axle], articulated: bool) -> list[bool]:
-    """Whether each axle swings on a pin. Where the file says it of none: as most machines do, one that steers beside one that does not,
+    """Whether each axle swings on a pin. Where the file says it of none: as most machines do, one that steers beside a pair that does not,
     and the last of an ``articulated`` machine (docs/decisions/0176)."""
     stated = any(axle.pivots for axle in axles.values())
-    rigid = all(axle.steered for axle in axles.values())
+    upright = any(not axle.steered and len(axle.wheels) > 1 for axle in axles.values())
     last = list(axles)[-1] if articulated else None
     return [
-        (axle.steered and not rigid) or key == last
-        if axle.pivots is None and not stated
-        else bool(axle.pivots)
+        (axle.steered and upright) or key == last if axle.pivots is None and not stated else bool(axle.pivots)
         for key, axle in axles.items()
     ]
 
