@@ -169,6 +169,9 @@ def test_files_of_one_drive_are_named_and_drives_alike_are_not(tmp_path: Path) -
         assert words.startswith(
             f"{second.name} holds the same drive as whole.parquet, so its rows count twice"
         )
+    (tmp_path / "b").mkdir()
+    namesake = _driven(tmp_path / "b" / "whole.parquet", time, speed + noise)
+    assert f"{namesake} holds the same drive as {whole}," in repeated([whole, namesake])[0]
     convoy = _driven(tmp_path / "convoy.parquet", time, speed + other)
     cruise = [
         _driven(tmp_path / f"{k}.parquet", time, 2 + 0.2 * one, 0.1) for k, one in enumerate((noise, other))

@@ -83,9 +83,8 @@ def repeated(paths: Sequence[Path]) -> list[str]:
         same = (one for one, before in drives if _is_same(before, drive) and _turned_alike(one, path))
         other = next(same, None)
         if other is not None:
-            words.append(
-                f"{path.name} holds the same drive as {other.name}, so its rows count twice: leave one out."
-            )
+            one, first = (path, other) if path.name == other.name else (path.name, other.name)
+            words.append(f"{one} holds the same drive as {first}, so its rows count twice: leave one out.")
         drives.append((path, drive))
     return words
 
