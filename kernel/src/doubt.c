@@ -37,11 +37,11 @@ static tg_real by_lock(const tg_estimator *e, int32_t i)
 
 /* Variance of the lateral specific force, where neither an accelerometer nor a roll shows it: hills have no direction, so the ground is as
  * steep across the way as it is along it: as measured, else as the file states it. */
-static tg_real unseen_lateral(const tg_estimator *e)
+static tg_real unseen_lateral(const tg_estimator *e, double time)
 {
     const tg_settings *s = &e->settings;
     const int32_t known = e->pitch.count > 0 || e->slope.running;
-    if (e->lateral.seen || e->roll.seen) return 0;
+    if (e->lateral.seen || tgi_roll_known(e, time)) return 0;
     return tgi_square(s->machine.gravity) * (known ? e->roughness.grade : tgi_square(s->uncertainty.slope));
 }
 
@@ -53,7 +53,7 @@ static tg_real unseen_lateral(const tg_estimator *e)
 void tgi_doubt_adhesions(tg_estimator *e, const tg_row *row, const tg_drive *drive)
 {
     const tg_settings *s = &e->settings;
-    const tg_real lateral = unseen_lateral(e);
+    const tg_real lateral = unseen_lateral(e, row->time);
     for (int32_t i = 0; i < s->machine.wheels; i++) {
         const tg_hold *const torque = &e->torque[i];
         const tg_real square = row->chatter[i], arm = s->machine.radius[i] * drive->load[i];

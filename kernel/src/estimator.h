@@ -227,6 +227,7 @@ int32_t tgi_track_motion(tg_estimator *e, const tg_row *row);
 void tgi_weigh(tg_estimator *e, tg_row *row, tg_drive *drive);
 tg_real tgi_mass_spread(const tg_estimator *e);
 tg_real tgi_hitch_spread(const tg_estimator *e);
+int32_t tgi_roll_known(const tg_estimator *e, double time);
 void tgi_loads(tg_estimator *e, const tg_row *row, tg_drive *drive);
 
 /* inputs.c */

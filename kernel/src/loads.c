@@ -70,6 +70,9 @@ static tg_real specific_force(tg_estimator *e, const tg_row *row)
     return e->balance.seen ? e->balance.value : 0;
 }
 
+/* Whether a roll was measured, no longer than a gap ago. */
+int32_t tgi_roll_known(const tg_estimator *e, double time) { return e->roll.seen && time - e->roll.time <= (double)e->settings.gap; }
+
 /* Specific force to the left, which moves load from the left wheels to the right: the accelerometer's, else what the turn and a measured
  * roll make of it, v psi' + g sin(roll). And the cosine of the roll: across a slope the ground carries less than the weight. */
 static tg_real lateral_force(tg_estimator *e, const tg_row *row, tg_real g, tg_real *upright)
@@ -78,7 +81,7 @@ static tg_real lateral_force(tg_estimator *e, const tg_row *row, tg_real g, tg_r
     const int32_t leans = e->lateral.seen && row->time - e->yaw_time <= 1; /* and does not turn unseen */
     const tg_real felt = tgi_lowpass(&e->lateral, row->value[TG_ACCELERATION_Y], row->time, e->settings.load_filter);
     const tg_real roll = tgi_lowpass(&e->roll, row->value[TG_ROLL], row->time, e->settings.load_filter);
-    const tg_real sine = e->roll.seen ? tgi_sin(roll) : leans ? (felt - turn) / g : 0, square = tgi_square(sine);
+    const tg_real sine = tgi_roll_known(e, row->time) ? tgi_sin(roll) : leans ? (felt - turn) / g : 0, square = tgi_square(sine);
     *upright = tgi_sqrt(1 - (square < TG_STEEPEST ? square : TG_STEEPEST));
     return e->lateral.seen ? felt : turn + g * sine;
 }
