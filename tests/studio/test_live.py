@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from fastapi.testclient import TestClient
 
 from terragrip.estimation import Estimates
 from terragrip.studio.app import create_app
+from terragrip.studio.replay import relayed
 
 STREAM = "ws://127.0.0.1:8750/api/live"
 
@@ -130,3 +132,17 @@ def test_a_service_that_is_not_there_is_said(folder: Path) -> None:
         said = socket.receive_json()["text"]
     assert "does not answer" in said
     assert "studio://127.0.0.1:9" in said  # the address that was named, not another
+
+
+def test_a_page_that_leaves_rows_unread_is_left_at_once(service: str) -> None:
+    """A studio took ten seconds more to end, or twenty."""
+
+    async def leave() -> float:
+        messages = relayed(service, None)
+        await anext(messages)
+        await asyncio.sleep(0.3)  # meanwhile more rows come than are kept
+        begun = time.monotonic()
+        await messages.aclose()
+        return time.monotonic() - begun
+
+    assert asyncio.run(leave()) < 5

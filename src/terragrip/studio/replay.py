@@ -122,7 +122,10 @@ async def relayed(address: str, token: str | None, vehicle: str = "") -> AsyncIt
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     try:
         async with connect(
-            f"{address.rstrip('/')}/?{query}", additional_headers=headers, max_size=1 << 20
+            f"{address.rstrip('/')}/?{query}",
+            additional_headers=headers,
+            max_size=1 << 20,
+            close_timeout=0.5,  # the answer stands behind the rows that a page left unread, and does not come
         ) as socket:
             async for message in _together(socket):
                 yield message
