@@ -9,6 +9,7 @@ from tests.estimation.drives import drive, robot, with_values
 from terragrip.estimation import estimate
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", ["ground_speed", "drawbar_force", "wheel_speed_fl"])
 @pytest.mark.parametrize("value", [1e200, -1.7e308])
 def test_one_value_that_nothing_measures_costs_its_row(name: str, value: float) -> None:

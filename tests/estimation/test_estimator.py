@@ -44,6 +44,7 @@ def test_noise_is_averaged_and_within_the_intervals(method):
             assert np.mean(error < 1.96 * estimates[f"{name}_std"][late]) > 0.9, name
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("method", METHODS)
 def test_sample_by_sample_is_the_whole_recording_bit_for_bit(noisy, method):
     whole = estimate(noisy.recording, robot(), method)

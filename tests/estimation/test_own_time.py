@@ -101,6 +101,7 @@ def test_a_wheel_without_a_sample_in_the_first_row_of_motion_waits_for_it() -> N
     assert abs(error) < 1.96 * estimates["wheel_speed_fl_std"][first]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", [8999502, 8999505])
 @pytest.mark.parametrize("every", [1, 5])
 def test_a_silent_wheel_may_move_as_its_hub_does(seed: int, every: int) -> None:

@@ -208,6 +208,7 @@ def pendulum(x: Array, u: float) -> Array:
     return np.stack([x[..., 1], u - 9.81 * np.sin(x[..., 0]) - 0.1 * x[..., 1]], axis=-1)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("vectorized", [False, True])
 def test_nonlinear_filters_follow_a_pendulum(vectorized):
     rng = np.random.default_rng(2)

@@ -143,6 +143,7 @@ def test_bank_weights_by_the_mixture_and_leaves_missing_channels_out():
     np.testing.assert_array_equal(bank.probabilities, kept)
 
 
+@pytest.mark.long  # its weights are those of an enumeration: below
 def test_bank_finds_the_scale_that_made_the_data():
     rng = np.random.default_rng(5)
     for true_scale in (0.1, 10.0):

@@ -42,7 +42,7 @@ def run(problem: Any, tuning: Tuning, start: Any = None) -> TractionFilter:
     return filter
 
 
-@pytest.mark.sample(3)
+@pytest.mark.long  # the kernel's, which agree with these, are in test_kernel_agreement.py
 @pytest.mark.parametrize("engine", ["exact", "unscented"])
 @pytest.mark.parametrize("policy", ["adaptive", "supervised"])
 def test_sensitivities_agree_with_differences_of_the_whole_recursion(engine, policy, problem):
@@ -161,7 +161,7 @@ def test_A_finds_a_wrong_noise_of_a_random_walk(assumed):
     )  # in shares of the true noise, though assumed 10 times off
 
 
-@pytest.mark.sample(2)
+@pytest.mark.long  # a random walk's: below; the kernel's A is compared in test_kernel_agreement.py
 @pytest.mark.parametrize("assumed", [0.1, 10.0])
 def test_A_finds_a_wrong_adhesion_noise_of_a_machine(assumed):
     rng = np.random.default_rng(1)
@@ -221,6 +221,7 @@ def test_A_remembers_innovations_softened_and_whitened_by_the_S_of_their_step():
     np.testing.assert_allclose(adaptive.adaptation.C, C + share * (np.outer(white, white) - C))
 
 
+@pytest.mark.long  # what A remembers of an innovation is checked by hand below
 def test_a_wide_start_and_jumping_steps_leave_A_alone():
     """Neither says anything of Q: innovations that are as large as S says, a hundredfold different from one to the next."""
     rng = np.random.default_rng(3)

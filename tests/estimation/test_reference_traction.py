@@ -69,7 +69,7 @@ def test_runge_kutta_stays_near_the_exact_solution():
 # ---- the filter ----
 
 
-@pytest.mark.sample(2)
+@pytest.mark.long  # the kernel's two, which agree with these, are in test_kernel_agreement.py
 @pytest.mark.parametrize("policy", ["fixed", "adaptive", "supervised"])
 def test_exact_and_unscented_agree(policy, problem):
     case = problem(8, wheels=3, steps=300, missing=0.1, spikes=0.02, accelerometer=True, restarts=True)
@@ -111,7 +111,7 @@ def test_exact_agrees_with_a_ten_line_filter(problem, ten_line_filter):
         assert agreement(filter.moments(), (x[:6], P[:6, :6])) < 1e-9
 
 
-@pytest.mark.sample(2)
+@pytest.mark.long  # without the traction model: test_reference.py
 @pytest.mark.parametrize("policy", ["fixed", "supervised", "bank"])
 def test_double_agrees_with_long_double(policy, problem):
     case = problem(31, wheels=2, steps=200, condition=1e5, missing=0.1, accelerometer=True, restarts=True)
@@ -146,6 +146,7 @@ def test_predict_is_a_step_without_measurements(problem):
     assert filter.time == pytest.approx(sum(k.dt for k in case.instants) + 0.5)
 
 
+@pytest.mark.long  # its moments are those of ten lines above
 def test_filter_finds_the_truth_and_knows_how_well(problem):
     case = problem(14, wheels=2, steps=2000, condition=100.0, accelerometer=True, missing=0.05)
     _, steps = run(case, Tuning(case.walk))

@@ -57,6 +57,7 @@ def assert_alike(one: Estimates, other: Estimates) -> None:
         assert np.nanmax(np.abs(one[f"{name}_std"] - other[f"{name}_std"]) / sd) < 1e-3, name
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("method", METHODS)
 def test_single_precision_gives_the_estimates_of_double(method, single):
     log = faulty_drive()

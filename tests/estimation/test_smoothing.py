@@ -54,6 +54,7 @@ def smoothed_in(recording: Recording, estimator: TractionEstimator, rows: int, s
     return Estimates(np.concatenate([part.time for part in parts]), columns, codes, labels)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("method", ["kalman", "bank", "aukf-fs"])
 def test_the_block_length_does_not_matter(method):
     """Rows 999 and 1000 lie on either side of the gap."""

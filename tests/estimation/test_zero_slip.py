@@ -45,6 +45,7 @@ def field_day(seed: int, light: float = 0.25) -> np.ndarray:
     return np.where(inside < 400 * (1 - light), beds + 0.01 * np.sin(inside / 30), 0.004)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("seed", range(1000, 1006))
 @pytest.mark.parametrize("light", [0.15, 0.4])
 def test_light_work_is_found_in_a_field_day(seed: int, light: float) -> None:

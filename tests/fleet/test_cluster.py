@@ -6,6 +6,7 @@ Real ones: test_faults.py and test_s3.py.
 from __future__ import annotations
 
 from concurrent.futures import CancelledError
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -114,6 +115,46 @@ def test_workers_here_have_the_memory_that_is_asked_for(monkeypatch: pytest.Monk
     monkeypatch.setattr(distributed, "LocalCluster", cluster)
     with pytest.raises(InputError, match="2 workers, 420000000 bytes"), workers_at(None, 2, "420MB"):
         pass
+
+
+class _Here(AbstractContextManager[None]):
+    """A cluster of this machine whose workers are gone with their first batch."""
+
+    workers: dict[str, int]
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def scale(self, count: int) -> None:
+        self.workers.update({str(k): 1 for k in range(count)})
+
+
+def test_workers_here_that_dask_gives_up_are_started_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Real ones: test_faults.py."""
+    distributed = pytest.importorskip("distributed", reason="needs terragrip[fleet]")
+    here = _Here()
+    here.workers = {"0": 1, "1": 1}
+
+    class Waiting(_Future):
+        @property
+        def status(self) -> str:
+            return "finished" if here.workers else "pending"
+
+    def submit(batch: list[FleetLog]) -> Any:
+        here.workers.clear()
+        return Waiting(key="a", result=lambda **_: [Outcome(log.name) for log in batch])
+
+    dask = client(submit)
+    dask.scheduler_info = lambda **_: {"workers": here.workers}
+    dask.run_on_scheduler = lambda _: set()
+    monkeypatch.setattr(distributed, "LocalCluster", lambda **_: here)
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: dask)
+    monkeypatch.setattr("terragrip.fleet.cluster._COUNT", 0.0)
+    monkeypatch.setattr("terragrip.fleet.cluster.PATIENCE", 5.0)
+    with workers_at(None, 2, None) as pool:
+        outcomes = list(pool.run(logs(3), None, None))  # type: ignore[arg-type]
+    assert [one.reason for one in outcomes] == [None] * 3
+    assert len(here.workers) == 2
 
 
 class Refusing(MemoryFileSystem):

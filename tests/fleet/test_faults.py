@@ -205,6 +205,7 @@ def test_a_scheduler_whose_workers_are_all_lost_is_one_line(
     assert json.loads(notes[-1].read_text())["log"] == "long.csv"
 
 
+@pytest.mark.long  # by a stand-in: test_cluster.py
 @pytest.mark.usefixtures("scratch")
 def test_a_worker_here_that_dask_gives_up_is_started_anew(
     place: Path, capsys: pytest.CaptureFixture[str]

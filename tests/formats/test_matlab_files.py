@@ -253,6 +253,7 @@ def test_labels_of_a_categorical_and_of_a_tables_column_are_read() -> None:
     assert plain(labels) == ["grass", "", "sand"]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("version", ["5", "7.3"])
 @pytest.mark.parametrize(
     ("channel", "length"), [("ground_speed", 199), ("wheel_speed_r", 199), ("drawbar_force", 40)]

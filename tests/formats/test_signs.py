@@ -57,6 +57,7 @@ def turned(found: Inspection) -> set[str]:
     return {column for p in proposals if p.entry.get("sign") == -1 for column in p.columns}
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("known", [False, True])
 @pytest.mark.parametrize("odd", [[], RIGHT, RIGHT[:2], TORQUES[:1], TORQUES, [PULL], [YAW], [*RIGHT, YAW]])
 def test_what_counts_backward_gets_a_sign_and_the_profile_reads_the_right_log(

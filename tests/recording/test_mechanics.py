@@ -78,6 +78,7 @@ SENSORS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("hills", [0.0, 0.05, 0.15])
 @pytest.mark.parametrize("missing", SENSORS)
 def test_a_right_log_is_left_alone(missing: str, hills: float) -> None:

@@ -164,6 +164,7 @@ def test_a_map_that_was_replaced_is_not_mixed_with_the_new_one(client: TestClien
     assert "was replaced" in answer.json()["detail"]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("run", "state"), [("monday", "done"), ("nowhere", "failed")])
 def test_a_map_is_made_as_a_job(client: TestClient, maps: Path, run: str, state: str) -> None:
     wanted = {
