@@ -83,16 +83,16 @@ static void believe_leap(tg_hold *h)
     h->spike = 0;
 }
 
-/* One way, and alike to a factor of two; 0 is no leap. */
+/* Alike to a factor of two, either way, as the sides of a turn on the spot go; 0 is no leap. */
 static int32_t alike(tg_real one, tg_real other)
 {
-    const tg_real twice = 2 * one * other;
+    const tg_real twice = 2 * tgi_fabs(one * other);
     return twice > tgi_square(one) && twice > tgi_square(other);
 }
 
 /* Of `among` inputs of the wheels, leaps of most at the same instant that are alike are a manoeuvre, no spikes. `rate`: what each is capable of
- * in a second, where that is known. Of `torques`, given whose they are, those of the two wheels of an axle suffice, which crosses a border of
- * soils alone, unless they leap to 0, as a lost message is read, or are shares of one signal. */
+ * in a second, where that is known. Of `torques`, given whose they are, those of the two wheels of an axle suffice if they go one way, since an
+ * axle crosses a border of soils alone, unless they leap to 0, as a lost message is read, or are shares of one signal. */
 void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const tg_estimator *torques, int32_t wheels, int32_t among, double time)
 {
     tg_real leap[8];
@@ -107,7 +107,8 @@ void tgi_judge_leaps(tg_hold *h, const tg_real *rate, const tg_estimator *torque
         const int32_t twin = torques ? torques->constants.twin[i] : i;
         int32_t count = 0;
         for (int32_t j = 0; j < wheels; j++) count += alike(leap[i], leap[j]);
-        const int32_t border = twin != i && torques->shared[i] != TG_SAME && h[i].raw != 0 && alike(leap[i], leap[twin]);
+        const int32_t border =
+            twin != i && torques->shared[i] != TG_SAME && h[i].raw != 0 && leap[i] * leap[twin] > 0 && alike(leap[i], leap[twin]);
         if ((count > 1 && 2 * count > among) || border) believe_leap(&h[i]);
     }
 }
