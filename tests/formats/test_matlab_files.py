@@ -295,6 +295,24 @@ def test_a_unit_may_be_an_array_of_one_text(tmp_path: Path, unit: np.ndarray) ->
     assert read_table(tmp_path / "log.h5").units == {"ground_speed": "km/h"}
 
 
+def test_packed_numbers_of_netcdf_are_unpacked_and_fill_values_are_missing(tmp_path: Path) -> None:
+    """A speed packed into 16 bits was 30 000 km/h, in the unit beside it; a fill value of -1 was a speed."""
+    stored = np.round(SPEED / 3e-4).astype(np.int16)
+    stored[5] = -32768
+    with h5py.File(tmp_path / "log.nc", "w") as file:
+        for name, values in {"time": TIME, **OURS}.items():
+            file.create_dataset(name, data=stored if name == "ground_speed" else values)
+        speed, wheel = file["ground_speed"], file["wheel_speed_l"]
+        speed.attrs.update(
+            scale_factor=3e-4, add_offset=np.array([2.0]), _FillValue=np.array([-32768], np.int16)
+        )
+        wheel.attrs["missing_value"] = wheel[7]
+    found = read_table(tmp_path / "log.nc").columns
+    assert np.flatnonzero(np.isnan(found["ground_speed"])).tolist() == [5]
+    assert np.allclose(np.delete(found["ground_speed"], 5), np.delete(SPEED + 2, 5), atol=2e-4)
+    assert np.isnan(found["wheel_speed_l"][7])
+
+
 @pytest.mark.parametrize(
     ("nested", "key"), [("", "units"), ("log/", "units"), ("", "unit"), ("log/", "Unit")]
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -85,14 +86,25 @@ def _is_struct_array(group: Any, parts: dict[str, Any], h5py: Any) -> bool:
 def _array_of_hdf5(item: Any, *, turned: bool) -> Array:
     """A dataset of numbers; ``turned``: by MATLAB, whose first axis is the last one in the file."""
     shape = tuple(reversed(item.shape)) if turned else item.shape
+    whole = _packing_of(item)
 
     def part(rows: Any, column: Any) -> npt.NDArray[Any]:
         place: tuple[Any, ...] = (rows,) if len(shape) == 1 else (rows, column)
         if len(shape) == 2 and shape[0] == 1:
             place = (0, rows)  # a row vector
-        return np.asarray(item[tuple(reversed(place)) if turned else place])
+        return whole(np.asarray(item[tuple(reversed(place)) if turned else place]))
 
     def read() -> npt.NDArray[Any]:
-        return np.asarray(item[()]).T if turned else np.asarray(item[()])
+        return whole(np.asarray(item[()]).T if turned else np.asarray(item[()]))
 
     return Array(shape, read, part if len(shape) <= 2 else None)
+
+
+def _packing_of(item: Any) -> Callable[[npt.NDArray[Any]], npt.NDArray[Any]]:
+    """How a dataset's stored numbers become values: the packing and the missing values of netCDF (CF conventions 8.1 and 2.5.1)."""
+    one = {k: v for k, v in item.attrs.items() if np.size(v) == 1 and np.asarray(v).dtype.kind in "fiu"}
+    scale, offset = (float(np.ravel(one.get(k, d))[0]) for k, d in (("scale_factor", 1), ("add_offset", 0)))
+    codes = [np.ravel(one[name])[0] for name in ("_FillValue", "missing_value") if name in one]
+    if not codes and (scale, offset) == (1.0, 0.0):
+        return lambda stored: stored
+    return lambda stored: np.where(np.isin(stored, codes), np.nan, stored * scale + offset)
