@@ -59,6 +59,20 @@ def test_mdf_signals_keep_their_clocks_and_units(tmp_path: Path, version: str) -
     assert table.units["rpm_left"] == "rpm"
 
 
+def test_mdf_signals_of_one_name_are_told_apart_by_their_groups_or_sources(tmp_path: Path) -> None:
+    """Four motors' Speed were Speed, Speed@1, @2, @3, which inspect read as wheels 1, 2 and 3 (of 0 to 3), each one wheel too far."""
+    path = tmp_path / "log.mf4"
+    with asammdf.MDF() as file:
+        for place in ("FL", "FR"):
+            source = asammdf.Source(f"Motor_{place}", "", "", 1, 1)
+            file.append([asammdf.Signal(SPEED, TIME, name="Speed", source=source)])
+            file.append([asammdf.Signal(SPEED, TIME, name="v")], acq_name=f"bus {place}")
+            file.append([asammdf.Signal(SPEED, TIME, name="x")])
+        file.save(path)
+    names = set(read_table(path).columns) - {"time"}
+    assert sorted(names) == ["Speed@Motor_FL", "Speed@Motor_FR", "v@bus FL", "v@bus FR", "x", "x@5"]
+
+
 def test_mdf_bus_logging_by_the_built_in_table(tmp_path: Path) -> None:
     machine = drive(1000, 20.0)
     kind = np.dtype(

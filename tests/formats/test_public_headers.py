@@ -294,3 +294,9 @@ def test_a_scale_of_0_is_refused() -> None:
     """All speeds were 0: slip .57 ± .36, and a note on a dead sensor."""
     with pytest.raises(InputError, match="makes every value 0; write the factor"):
         Profile.from_dict({"channels": {"ground_speed": {"from": "v", "scale": 0}, "wheel_speed_l": "w"}})
+
+
+def test_the_number_of_a_group_or_sender_is_no_wheel() -> None:
+    numbered = ("Speed", "Speed@1", "Speed@2", "Speed@3", "Speed@0A", "Speed@bus4")
+    read = columns_of(numbered, {}, {}, GENERAL)
+    assert {column.name.wheel for column in read.values()} == {""}

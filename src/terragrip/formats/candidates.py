@@ -58,6 +58,8 @@ _WITHOUT_WHEELS = frozenset({"gps", "gnss", "rtk", "visual", "vio", "lidar", "ic
 _SLOPES = frozenset({"slope", "incline", "inclination", "steigung", "pente", "pendiente", "pendenza"})
 _GEARBOX = frozenset({"gearbox", "transmission", "getriebe"})
 _FUSED = frozenset({"filtered", "filter", "fused", "ekf", "ukf"})
+_COUNTED = re.compile(r"@(\d+|[\dA-F]{2}|bus\d+)$")
+"""Signals of one name in several groups, of several senders or buses: no number of a wheel."""
 _ALONG = {"longitudinal": "x", "lateral": "y", "vertical": "z"}
 _ABOUT = {"roll": "x", "pitch": "y", "yaw": "z"}
 
@@ -74,7 +76,7 @@ def columns_of(
     (alike, from_zero), several = _numbered(numbers), _of_several(numbers)
     result = {}
     for column in numbers:
-        name, stated = vocabulary.read(column.removeprefix(namespace)), units.get(column)
+        name, stated = vocabulary.read(_COUNTED.sub("", column.removeprefix(namespace))), units.get(column)
         joint = _joint_of(column, constants)
         concepts = {*name.concepts, *vocabulary.read(joint).concepts}
         wheel = vocabulary.read(joint).wheel if joint else name.wheel

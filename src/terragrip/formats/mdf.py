@@ -89,13 +89,28 @@ def _let_go(file: Any) -> None:
 
 
 def _names(file: Any, buses: set[int]) -> dict[str, tuple[int, int]]:
-    """Group and index of each measured signal; of several of one name, the later are ``name@group``."""
-    names: dict[str, tuple[int, int]] = {}
+    """Group and index of each measured signal; several of one name are ``name@source`` where their groups or sources are named apart,
+    else the later are ``name@group``."""
+    places: dict[str, list[tuple[int, int]]] = {}
     for k, group in enumerate(file.groups):
         for index, channel in enumerate(group.channels if k not in buses else ()):
             if file.masters_db.get(k) != index:
-                names[channel.name if channel.name not in names else f"{channel.name}@{k}"] = k, index
+                places.setdefault(channel.name, []).append((k, index))
+    names: dict[str, tuple[int, int]] = {}
+    for name, these in places.items():
+        apart = _named_apart([file.groups[k] for k, _ in these], [index for _, index in these])
+        marks = apart or ["", *(str(k) for k, _ in these[1:])]
+        for mark, place in zip(marks if len(these) > 1 else [""], these, strict=True):
+            names[f"{name}@{mark}" if mark else name] = place
     return names
+
+
+def _named_apart(groups: Sequence[Any], indices: Sequence[int]) -> list[str] | None:
+    """What tells signals of one name apart: their groups' names of acquisition, else their own sources'; None where neither does."""
+    acquired = [getattr(group.channel_group, "acq_name", None) for group in groups]
+    sources = [getattr(g.channels[k], "source", None) for g, k in zip(groups, indices, strict=True)]
+    by_source = ([getattr(source, key, None) for source in sources] for key in ("name", "path"))
+    return next((m for m in (acquired, *by_source) if all(m) and len(set(m)) == len(m)), None)
 
 
 def _values(samples: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
