@@ -107,9 +107,9 @@ def _names(file: Any, buses: set[int]) -> dict[str, tuple[int, int]]:
 
 def _named_apart(groups: Sequence[Any], indices: Sequence[int]) -> list[str] | None:
     """What tells signals of one name apart: their groups' names of acquisition, else their own sources'; None where neither does."""
-    acquired = [getattr(group.channel_group, "acq_name", None) for group in groups]
+    acquired = [getattr(group.channel_group, "acq_name", None) or "" for group in groups]
     sources = [getattr(g.channels[k], "source", None) for g, k in zip(groups, indices, strict=True)]
-    by_source = ([getattr(source, key, None) for source in sources] for key in ("name", "path"))
+    by_source = ([getattr(source, key, None) or "" for source in sources] for key in ("name", "path"))
     return next((m for m in (acquired, *by_source) if all(m) and len(set(m)) == len(m)), None)
 
 
