@@ -118,6 +118,26 @@ def test_torques_uneven_on_both_axles_are_the_load() -> None:
     assert notes_on(skidding(), drive_torque_rl=0.75, drive_torque_fl=0.75) == []
 
 
+@pytest.mark.parametrize("known", [None, "roll", "acceleration_y"])
+@pytest.mark.parametrize("pivots", [True, False])
+def test_torques_across_a_slope_are_the_load(pivots: bool, known: str | None) -> None:
+    """A right mower across 4 degrees: drive_torque_rl was .70 times drive_torque_rr, 'check the scale'. Its front axle pivots, so the rear
+    one holds it; or a differential keeps the front torques alike, which a measured slope alone explains."""
+    data = vehicle().to_dict()
+    data |= {"center_of_gravity_height": 0.45 if pivots else 0.67}
+    data["axles"]["front"]["pivots"] = pivots
+    mower, log, sideways = Vehicle.from_dict(data), skidding(), 0.75
+    level, lost = mower.wheel_shares
+    lean = {w: 1 - k * sideways for w, k in zip(WHEELS, lost / level, strict=True) if pivots or w[0] == "r"}
+    torques = {f"drive_torque_{w}": k * log.channels[f"drive_torque_{w}"] for w, k in lean.items()}
+    across = {"roll": np.arcsin(sideways / G), "acceleration_y": sideways}
+    shown = {known: np.full(len(log), across[known])} if known else {}
+    notes = side_warnings(log.with_channels(**torques, **shown), mower, log.channels["angular_velocity_z"])[1]
+    assert bool(notes) is (not pivots and known is None)
+    scaled = log.with_channels(drive_torque_rl=0.7 * log.channels["drive_torque_rl"], roll=np.zeros(len(log)))
+    assert len(side_warnings(scaled, mower, log.channels["angular_velocity_z"])[1]) == 1
+
+
 def test_small_gains_of_two_axles_do_not_add_up_to_a_scale() -> None:
     assert notes_on(skidding(), drive_torque_rl=0.87, drive_torque_fl=1.1) == []
 

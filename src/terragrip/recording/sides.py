@@ -32,6 +32,7 @@ _ROLL = 0.05  # of a rim's speed: radii of one axle's tyres differ by 2 %
 _APART = 0.1  # the same, where only other axles show that it is straight: the furrow wheel of a plough slips .1 less
 _PULLING = 0.1  # of an axle's load: torques that are compared
 _UNEVEN = 0.22  # the logarithm of 1.25: uncalibrated torques of a wheel are 5 % off, two of them 7
+_STEEPEST = 2.5  # m/s² sideways: machines hardly work across more than 15 degrees
 _STEADY = 0.15  # quartiles of such a logarithm
 _TOGETHER = 0.95  # correlation of an axle's pulls: what they do not share is 5 % of their ratio
 _OPPOSED = 0.7  # correlation, of the other sign
@@ -58,7 +59,7 @@ def side_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) -
     else:
         rolling = [note for axle in drive.axles for note in _rolling(axle, straight, _ROLL)]
     opposed = [note for axle in drive.axles for note in _opposed(axle, straight)]
-    return rolling, [] if rolling else opposed or _uneven(drive.axles, straight)
+    return rolling, [] if rolling else opposed or _uneven(drive, straight, recording, vehicle)
 
 
 def exchanged_torques(recording: Recording, vehicle: Vehicle, turn: Floats | None) -> list[str]:
@@ -259,22 +260,23 @@ def _share(axle: Axle, pulls: Floats, straight: Bools) -> float | None:
     )
 
 
-def _uneven(axles: tuple[Axle, ...], straight: Bools) -> list[str]:
-    """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike."""
-    shares: dict[str, tuple[float, Axle]] = {}
-    for axle in axles:
-        if axle.pulls is None:
-            continue
-        share = _share(axle, axle.pulls, straight)
+def _uneven(drive: Drive, straight: Bools, recording: Recording, vehicle: Vehicle) -> list[str]:
+    """An axle with one torque steadily larger than the other straight ahead, where the other axles' are alike, and no slope across which
+    the vehicle drives makes it so."""
+    shares: dict[str, float] = {}
+    for axle in drive.axles:
+        share = None if axle.pulls is None else _share(axle, axle.pulls, straight)
         if share is not None:
-            shares[axle.name] = (share, axle)
+            shares[axle.name] = share
     notes = []
-    for name, (share, axle) in shares.items():
-        others = [other for key, (other, _) in shares.items() if key != name]
+    for axle in drive.axles:
+        share, others = shares.get(axle.name), [other for key, other in shares.items() if key != axle.name]
         if (
-            not others
+            share is None
+            or not others
             or min(abs(share), np.abs(share - np.array(others)).min()) < _UNEVEN
             or max(map(abs, others)) > _UNEVEN / 2
+            or _leaning(drive.when[straight], shares, axle.name, recording, vehicle)
         ):
             continue
         a, b = axle.wheels
@@ -283,3 +285,27 @@ def _uneven(axles: tuple[Axle, ...], straight: Bools) -> list[str]:
             "scale of both; 'terragrip calibrate' finds their gains."
         )
     return notes
+
+
+def _leaning(
+    when: Floats, shares: dict[str, float], name: str, recording: Recording, vehicle: Vehicle
+) -> bool:
+    """Whether a slope across shifts as much load as the torques of the axle ``name`` differ by: by roll or accelerometer at the instants
+    ``when`` (n,) [s], else one at which all axles' torques are in proportion to their loads (one that pivots leans less)."""
+    level, leaning = vehicle.wheel_shares
+    lost = dict(zip(vehicle.wheels, (leaning / level).tolist(), strict=True))
+    channels, time = recording.channels, recording.time
+    if "roll" in channels:
+        sideways = STANDARD_GRAVITY * np.sin(np.interp(when, time, filled(time, channels["roll"])))
+    elif "acceleration_y" in channels:
+        sideways = np.interp(when, time, filled(time, channels["acceleration_y"]))
+    else:
+        sideways = np.full(1, np.nan)
+    known = float(np.mean(sideways))
+    tried = np.linspace(-_STEEPEST, _STEEPEST, 51) if np.isnan(known) else np.array([known])
+    compared = shares if np.isnan(known) else {name: shares[name]}
+    off = [
+        share + 2 * np.arctanh(np.clip(lost[vehicle.axles[axle].wheels[0]] * tried, -0.9, 0.9))
+        for axle, share in compared.items()
+    ]
+    return bool((np.abs(off).max(axis=0) < _UNEVEN / 2).any())
