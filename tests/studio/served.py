@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
+import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -47,17 +50,31 @@ class Served:
         return f"http://127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        app = create_app(self.folder, upload_limit=20_000_000, live=self.live)
-        config = uvicorn.Config(app, log_level="critical", timeout_graceful_shutdown=1)
+        self.app = create_app(self.folder, upload_limit=20_000_000, live=self.live)
+        config = uvicorn.Config(self.app, loop="asyncio", log_level="critical", timeout_graceful_shutdown=1)
         self.server = uvicorn.Server(config)
         self.thread = threading.Thread(target=self.server.run, args=([bound(self.port)],), daemon=True)
         self.thread.start()
         until(lambda: self.server.started)
 
     def stop(self) -> None:
+        for job in self.app.state.studio.jobs.all():  # what pytest shows where the test failed
+            print(f"{job.command}: {job.state}, {job.done} of {job.total} {job.text}")
         self.server.should_exit = True
         self.thread.join(60)
-        assert not self.thread.is_alive()
+        assert not self.thread.is_alive(), self._stands()
+
+    def _stands(self) -> str:
+        """What a studio that does not stop waits for: each thread's stack, each task."""
+        names = {thread.ident: thread.name for thread in threading.enumerate()}
+        stacks = [
+            f"{names.get(number)}\n{''.join(traceback.format_stack(frame))}"
+            for number, frame in sys._current_frames().items()
+        ]
+        tasks = [
+            repr(task) for server in self.server.servers for task in asyncio.all_tasks(server.get_loop())
+        ]
+        return "\n".join([*stacks, *tasks])
 
 
 def bound(port: int) -> socket.socket:

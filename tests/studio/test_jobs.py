@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
 import sqlite3
 import subprocess
 import sys
@@ -57,6 +59,22 @@ def test_progress_is_told(client: TestClient) -> None:
     assert states[0] == "queued"
     assert "running" in states
     assert states[-1] == "done"
+
+
+def test_a_job_that_cannot_be_started_fails_and_the_next_one_runs(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ran for ever in the list: its process could not be made, and nobody said so."""
+
+    async def none_left(*_: Any, **__: Any) -> None:
+        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(asyncio, "create_subprocess_exec", none_left)
+        job = wait(client, ask(client).json()["id"])
+    assert job["state"] == "failed"
+    assert "Resource temporarily unavailable" in job["text"]
+    assert wait(client, ask(client).json()["id"])["state"] == "done"
 
 
 def test_a_log_that_does_not_fit_fails_with_one_line(client: TestClient, folder: Path) -> None:

@@ -14,7 +14,6 @@ from terragrip.errors import InputError
 from terragrip.estimation.methods import DEFAULT
 
 if TYPE_CHECKING:
-    import asyncio
     from collections.abc import Callable
 
     from terragrip.live.many.service import ManyService
@@ -159,8 +158,7 @@ def command(
     emit(
         logger, "live_started", sources=service.source_names, sinks=[box.uri.name for box in service.outboxes]
     )
-    with asyncio.Runner(loop_factory=_loop_factory()) as runner:
-        runner.run(_run(service, screen, duration, quiet or as_json))
+    asyncio.run(_run(service, screen, duration, quiet or as_json))
     emit(logger, "live_stopped", **service.totals())
     if not (quiet or as_json):
         print(service.summary())
@@ -268,15 +266,6 @@ def _library(path: Path | None) -> SoilLibrary | None:
     from terragrip.soil.library import SoilLibrary
 
     return SoilLibrary.load(path)
-
-
-def _loop_factory() -> Callable[[], asyncio.AbstractEventLoop] | None:
-    """uvloop's loop, which costs less a sample, where it is installed (with the extra `live`); else asyncio's own."""
-    try:
-        import uvloop
-    except ModuleNotFoundError:
-        return None
-    return uvloop.new_event_loop
 
 
 async def _run(

@@ -109,10 +109,16 @@ class Jobs:
         self._keep(job)
         emit(logger, "job_started", job=job.id, kind=job.kind, output=job.output)
         self._publish(job)
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "terragrip.cli.job", *job.words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE, limit=1 << 22, cwd=self._folder,
-        )  # fmt: skip
+        try:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, "-m", "terragrip.cli.job", *job.words, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE, limit=1 << 22, cwd=self._folder,
+            )  # fmt: skip
+        except OSError as error:
+            self._end(
+                job, "failed", f"could not be started ({error.strerror}): free memory, or end other programs"
+            )
+            return
         self._process = process
         assert process.stdout is not None
         text, problem = await asyncio.gather(process.stdout.read(), self._follow(job, process.stderr))

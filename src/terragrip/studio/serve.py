@@ -78,6 +78,7 @@ def serve(
     # No access log: it would hold the token of the first request.
     config = uvicorn.Config(
         app,
+        loop="asyncio",  # also where uvloop is installed: a second loop would earn nothing here
         log_level="warning",
         access_log=False,
         ws_max_size=1 << 20,
