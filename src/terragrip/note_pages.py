@@ -36,6 +36,7 @@ PAGES = (
     ("must be in degrees", "formats#in-a-profile"),
     ("the axes point the other way", "formats#in-a-profile"),
     ("write 'sign: -1'", "formats#in-a-profile"),
+    ("a scale of 1 makes 1 N m", "formats#in-a-profile"),
     ("time may not be in seconds", "formats#in-a-profile"),
     ("written as hhmmss", "formats#dates"),
     ("angular_velocity_z turns with", "formats#in-a-profile"),

@@ -136,10 +136,15 @@ def test_a_torque_in_per_cent_asks_for_its_scale_and_its_profile_loads(tmp_path:
     assert proposal.give == "a torque in %: the scale in N m per % must be given by you"
     table = pd.DataFrame({"time": TIME, **columns}).rename(columns={n: f"{n} [%]" for n in units})
     table.to_csv(tmp_path / "log.csv", index=False)
-    (tmp_path / "p.yaml").write_text(
-        inspect(tmp_path / "log.csv").profile.replace("scale: 1.0", "scale: 1.5")
+    plain = inspect(tmp_path / "log.csv").profile
+    (tmp_path / "p.yaml").write_text(plain)  # as proposed: 1 N m for each %, without a word
+    assert any(
+        "a scale of 1 makes 1 N m of each %" in n
+        for n in read(tmp_path / "log.csv", tmp_path / "p.yaml").notes
     )
+    (tmp_path / "p.yaml").write_text(plain.replace("scale: 1.0", "scale: 1.5"))
     recording = read(tmp_path / "log.csv", tmp_path / "p.yaml")
+    assert not any("a scale of 1" in note for note in recording.notes)
     np.testing.assert_allclose(recording["drive_torque_r"], 1.5 * columns[name.format("r")])
 
 

@@ -21,6 +21,7 @@ from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
 from terragrip.recording.alignment import aligned
 from terragrip.recording.counted import refuse_counted
+from terragrip.recording.interpolated import lines_in, without_lines
 from terragrip.vehicle import Vehicle, require_vehicle
 
 if TYPE_CHECKING:
@@ -134,8 +135,9 @@ def _row_by_row(
     # One stretch of light work may determine the zero of slip, and a sample of the rows can miss it.
     reference = slip_reference_in(log.whole(), vehicle) if alone else None
     turn, turn_notes = turn_in(log, known.sample, vehicle)
+    lines = lines_in(known.sample)
     estimator = TractionEstimator.for_recording(
-        known.sample,
+        without_lines(known.sample, lines),
         vehicle,
         options.method,
         sensors=options.sensors,
@@ -156,7 +158,7 @@ def _row_by_row(
     def notes() -> tuple[str, ...]:
         return (*(found.result() if found else ()), *turn_notes)
 
-    blocks = (known.without_empty(block) for block in log.blocks())
+    blocks = (without_lines(known.without_empty(block), lines) for block in log.blocks())
     forward = passes.of(log.from_disk)
     if options.smooth:
         from terragrip.estimation.smoothing import smoothed

@@ -14,6 +14,7 @@ from terragrip.errors import InputError, nearest
 from terragrip.formats.machines import of_one_machine
 from terragrip.formats.profile_parts import MADE_OF, Source, TimeSource, matching
 from terragrip.formats.table import LogTable
+from terragrip.formats.vocabulary import GENERAL
 from terragrip.recording.checks import how_to_pivot
 from terragrip.recording.frames import names_and_units
 from terragrip.recording.schema import TIME, rim_names
@@ -22,6 +23,7 @@ from terragrip.units import UnitError, factor_to
 if TYPE_CHECKING:
     from terragrip.formats.profile import Profile
 
+_NO_TORQUE = {"%", "percent", "A", "mA"}
 _SIDEWAYS = 0.3  # of the forward speed: more than wheels slip sideways
 
 
@@ -54,6 +56,12 @@ def bound(profile: Profile, log: LogTable, *, partial: bool = False) -> tuple[Pr
         notes.append(
             f"{', '.join(plain)} are efforts of joints as N m, as ROS defines them; many drivers give a motor's current: ask yours. If "
             "it is N m, 'unit: N m' in a profile says so; of a current write 'scale', the motor's constant times the gear ratio."
+        )
+    plain = [n for n, one in channels.items() if n.startswith("drive_torque_") and _is_unscaled(one, log)]
+    if plain:
+        notes.append(
+            f"{', '.join(plain)} are from columns in per cent or of a current, and a scale of 1 makes 1 N m of each % or A: write in the "
+            "profile as 'scale' how many N m at the wheel one is."
         )
     for name, source in channels.items():
         origin = profile.channels[name]
@@ -97,6 +105,15 @@ def efforts(channels: Mapping[str, Source]) -> dict[str, Source]:
         for name, source in channels.items()
         if name.startswith("drive_torque_") and any(".effort" in column for column in source.columns)
     }
+
+
+def _is_unscaled(source: Source, log: LogTable) -> bool:
+    """Whether a torque is a share or a current as the log has it: a proposed profile, for one, whose scale was not filled in."""
+    names = [GENERAL.read(column) for column in source.columns]
+    units = {log.units.get(c) or name.unit for c, name in zip(source.columns, names, strict=True)}
+    return abs(source.scale) == 1.0 and (
+        bool(units & _NO_TORQUE) or any(name.has("current") and not name.has("torque") for name in names)
+    )
 
 
 def _are_zero(sources: Iterable[Source], log: LogTable) -> bool:

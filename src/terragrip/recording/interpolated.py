@@ -6,6 +6,8 @@ channel all do, but for those at the samples, which are evenly spaced. What lies
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,23 +27,49 @@ _FEWEST = 20  # samples
 _EVEN = 0.6  # share of their distances that is the usual one, to a row
 
 
+@dataclass(frozen=True)
+class Lines:
+    """An interpolated channel: when its first sample was, the time between two, and between two rows [s]."""
+
+    first: float
+    period: float
+    spacing: float
+
+
 def interpolated_warnings(recording: Recording) -> list[str]:
     """A sentence on speeds and torques that lie on straight lines between evenly spaced samples."""
-    wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]
-    periods = {n: period_of_lines(recording.time, recording.channels[n]) for n in wanted}
-    known = {name: period for name, period in periods.items() if period is not None}
+    known = lines_in(recording)
     if not known:
         return []
-    each = ", ".join(f"{name} ({period:.2g} s)" for name, period in known.items())
+    each = ", ".join(f"{name} ({lines.period:.2g} s)" for name, lines in known.items())
     return [
         f"{each}: values lie on straight lines between samples that far apart, so they were interpolated: what lies between is no "
-        "measurement, and intervals of speed, slip and soil resistance are too narrow. Give the log as it was measured, without "
-        "interpolation (empty cells between the samples)."
+        "measurement, and estimates leave it out. Better give the log as it was measured, without interpolation (empty cells between the "
+        "samples)."
     ]
 
 
-def period_of_lines(time: Floats, values: Floats) -> float | None:
-    """Time [s] between the samples of an interpolated channel (n,); None of one that has noise of its own, or is too coarse to tell."""
+def lines_in(recording: Recording) -> dict[str, Lines]:
+    """The interpolated speeds and torques of a recording, by channel."""
+    wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]
+    found = {name: lines_of(recording.time, recording.channels[name]) for name in wanted}
+    return {name: lines for name, lines in found.items() if lines is not None}
+
+
+def without_lines(recording: Recording, known: Mapping[str, Lines]) -> Recording:
+    """The recording, or a part of it, with one value of an interpolated channel in each of its periods, the others missing."""
+    channels = dict(recording.channels)
+    for name, lines in known.items():
+        since = recording.time - lines.first
+        before, after = (
+            np.floor((since + part) / lines.period) for part in (-lines.spacing / 2, lines.spacing / 2)
+        )
+        channels[name] = np.where(before < after, channels[name], np.nan)
+    return replace(recording, channels=channels)
+
+
+def lines_of(time: Floats, values: Floats) -> Lines | None:
+    """The samples of an interpolated channel (n,); None of one that has noise of its own, or is too coarse to tell."""
     time, values = measured_part(time, values)
     if len(values) < 3 * _FEWEST:
         return None
@@ -65,4 +93,5 @@ def period_of_lines(time: Floats, values: Floats) -> float | None:
         or median(bend[bent] / straight[bent]) < _RESOLVED
     ):
         return None
-    return float(length * usual)
+    period = float(np.mean(apart[np.abs(apart - length) <= 1]) * usual)  # 3 Hz at 20 Hz: 6 or 7 rows
+    return Lines(float(time[rows[0] + 1]), period, float(usual))
