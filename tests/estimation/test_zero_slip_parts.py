@@ -199,6 +199,13 @@ def test_a_yaw_rate_says_what_is_straight(yaw: float, used: int) -> None:
     assert len(counted(2.0 * wave, 2.5 * wave, **sides)[0]) == used
 
 
+@pytest.mark.parametrize(("half_track", "used"), [(0.8, 12), (0.84, 0)])
+def test_a_turn_that_moves_the_outermost_hub_by_two_hundredths_is_none(half_track: float, used: int) -> None:
+    wave = 1 + 1e-3 * np.sin(TIME)
+    channels = {"ground_speed": 2 * wave, "wheel_speed_l": 5 * wave, "angular_velocity_z": -0.0485 + 0 * wave}
+    assert len(_windows(Recording(TIME, channels), "wheel_speed_l", 0.5, None, {}, half_track)[0]) == used
+
+
 @pytest.mark.parametrize(("apart", "used"), [(0.049, 12), (0.051, 0)])
 def test_without_one_the_wheels_do(apart: float, used: int) -> None:
     wave = 1 + 1e-3 * np.sin(TIME)

@@ -57,7 +57,8 @@ def slip_reference_in(log: Recording, vehicle: Vehicle) -> SlipReference:
     radii = vehicle.radii if vehicle.knows_wheels else {}
     alike = dict[str, list[str]]()  # a sentence, and the wheels of which it is true
     for rim in rims_of(vehicle, log.channels, log.source):
-        at = zero_of([log], rim.channel, 1.0 if rim.wheel == DRIVE else rim.radius, radii=radii)
+        radius = 1.0 if rim.wheel == DRIVE else rim.radius
+        at = zero_of([log], rim.channel, radius, radii=radii, half_track=(vehicle.track or 0.0) / 2)
         if at is not None:
             zero[rim.wheel] = at
         learns = rim.wheel == DRIVE and calibrated_scale(vehicle) is None

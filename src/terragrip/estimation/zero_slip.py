@@ -37,6 +37,7 @@ REMEDY = "also record 40 s without load (headland, road), or state which rows ar
 _SLOWEST = 0.3  # m/s
 _GOING = 0.5  # of the window's mean speed: slower samples are stops
 _TURNING = 0.05  # rad/s
+_HUB = 0.02  # of the ground speed: what a turn adds to the outermost hub
 _STRAIGHT = 0.05  # relative difference of the wheels' speeds
 _ROAD = 5.0  # m/s: faster than any work in the soil
 _PLAUSIBLE = 0.15  # a radius is not further off than this; units are
@@ -74,17 +75,18 @@ def zero_of(
     radius: float,
     light: Sequence[Span | None] | None = None,
     radii: Mapping[str, float] = _ALIKE,
+    half_track: float = 0.0,
 ) -> Zero | None:
     """The zero of a channel over logs of one machine; None where there are too few windows of driving.
 
     ``channel`` times ``radius`` is the rim speed [m/s]. ``light``: of each log the span [s] that was driven without load, if the
     user knows one; then only that counts. ``radii`` [m]: of all wheels, where they are not alike, to see by their rims' speeds what is
-    straight.
+    straight. ``half_track`` [m]: of the outermost hub, which a turn moves beside the middle.
     """
     spans = [None] * len(logs) if light is None else list(light)
     declared = any(span is not None for span in spans)
     parts = [
-        _windows(log, channel, radius, span, radii)
+        _windows(log, channel, radius, span, radii, half_track)
         for log, span in zip(logs, spans, strict=True)
         if channel in log.channels and (span is not None or not declared)
     ]
@@ -188,7 +190,12 @@ def _fit(ratio: Floats, number: int, mean: Floats) -> tuple[float, list[tuple[fl
 
 
 def _windows(
-    recording: Recording, channel: str, radius: float, span: Span | None, radii: Mapping[str, float] = _ALIKE
+    recording: Recording,
+    channel: str,
+    radius: float,
+    span: Span | None,
+    radii: Mapping[str, float] = _ALIKE,
+    half_track: float = 0.0,
 ) -> tuple[Floats, Bools]:
     """Ground speed over rim speed in windows without a stop (n,), of one wheel in straight ones; and whether each is of a road."""
     log = without_held(recording, held_periods(recording))
@@ -204,14 +211,17 @@ def _windows(
         used = (np.abs(ground) > _SLOWEST) & (np.abs(rim) > _SLOWEST) & (ground * rim > 0)
         used &= (slowest > _GOING * np.abs(ground)) & (least > _GOING * np.abs(rim))
         if channel != "wheel_based_speed":
-            used &= _straight(log, place, count, radii)
+            used &= _straight(log, place, count, radii, half_track, ground)
         return (ground / rim)[used], (np.abs(ground) > _ROAD)[used]
 
 
-def _straight(log: Recording, place: Ints, count: int, radii: Mapping[str, float]) -> Bools:
+def _straight(
+    log: Recording, place: Ints, count: int, radii: Mapping[str, float], half_track: float, ground: Floats
+) -> Bools:
     """Windows (count,) in which no turn shows: in the yaw rate, else in the rims' speeds."""
     if "angular_velocity_z" in log.channels:
-        return ~(np.abs(window_means(log.channels["angular_velocity_z"], place, count)) > _TURNING)
+        turn = np.abs(window_means(log.channels["angular_velocity_z"], place, count))
+        return ~(turn > _TURNING) & ~(turn * half_track > _HUB * np.abs(ground))
     rims = np.stack(
         [radii.get(w, 1.0) * window_means(log.channels[f"wheel_speed_{w}"], place, count) for w in log.wheels]
     )

@@ -30,7 +30,7 @@ def calibrate_radii(
                 if not driven:
                     continue
                 channel, radius = "wheel_based_speed", 1.0
-            zero = zero_of(logs, channel, radius, light, vehicle.radii)
+            zero = zero_of(logs, channel, radius, light, vehicle.radii, (vehicle.track or 0.0) / 2)
             radius_of = Quantity(
                 "wheel_radius", data.radius, 0.0, "m", _evidence(logs, sources, channel), "", wheel=wheel
             )
