@@ -33,6 +33,7 @@ _LEAST = 40.0  # s of driving: in 22 s one start outweighs all blocks (a right l
 _BLOCKS = 12  # for the jackknife
 _STARTS = 2.5  # blocks among which the rims' change is spread, by its squares: a start or two have no scatter
 _COMMANDED = 0.1  # of what thrust and pull vary by (SD): where the rims change less, what the load does to them outweighs what they command
+_COMMAND = 0.15  # correlation of thrust and rims' rate: below it the load drives both, as under a governor with droop
 _SURE = 3.0  # standard errors
 _ALIKE = 0.5  # correlation of ground's and rims' rates, of a pull with that just before and after: below it nothing stands out of noise
 _ACCELERATION = 1.8  # against both the ground's and the rims' rate
@@ -203,6 +204,8 @@ def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:
     if courses.pull is None or courses.beside is None:
         # what a trailer's inertia pulls in starts is no instrument, but a part of the force all the same
         left = courses.thrust if courses.pull is None else courses.thrust - courses.pull
+        if _correlation(left, courses.rims) < _COMMAND:
+            return []
         fits = [courses.slopes(left, own)[0] for own in (change, courses.change)]
         off = all(mass.high < 1 / _FORCE for mass in fits)
         off |= courses.pull is not None and all(mass.low > _FORCE for mass in fits)
