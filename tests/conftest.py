@@ -62,6 +62,15 @@ def unchecked() -> Generator[None]:
 
 
 @pytest.fixture(scope="module")
+def one_form() -> Generator[None]:
+    """Soils are learned by the form that is asked for, and no other is tried, which takes half of the time of learning; what others say is
+    in tests/soil/test_choice.py and test_learn.py, and on a page in report/test_soil_sections.py."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("terragrip.soil.learn._compared", lambda *_: None)
+        yield
+
+
+@pytest.fixture(scope="module")
 def small_forests() -> Generator[None]:
     """Ground classifiers grow a fifth of their trees, which takes half of the time of learning from a few drives; scikit-learn's whole
     forest is compared in test_classifier_parts.py, and the measured grounds of test_classifier_husky.py are told with it."""

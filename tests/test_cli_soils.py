@@ -17,6 +17,8 @@ from terragrip.physics.adhesion import CURVES
 from terragrip.recording.checks import NOTHING_TOWED
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("one_form")
+
 ROWS = 3000
 VEHICLE: dict[str, Any] = {
     "name": "robot",

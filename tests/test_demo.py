@@ -32,7 +32,7 @@ def shorter(name: str, seed: int) -> SimulationResult:
 
 @pytest.fixture(scope="module", name="demo")
 def demo_fixture(
-    tmp_path_factory: pytest.TempPathFactory, undrawn_in_file: None
+    tmp_path_factory: pytest.TempPathFactory, undrawn_in_file: None, one_form: None
 ) -> tuple[DemoResult, Path, list[tuple[int, int, str]]]:
     """The demo of multi1, multi2 and one short run, calibrated by a quarter of the usual runs, and what its progress said. Each kind of its
     figures is drawn by the tests of its section in tests/report."""

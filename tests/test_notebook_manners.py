@@ -24,6 +24,8 @@ from terragrip.ground.views import table_of
 from terragrip.simulation import Scenario, simulate
 from terragrip.soil.estimates import GatheredRuns
 
+pytestmark = pytest.mark.usefixtures("one_form")
+
 pytest.importorskip("matplotlib", reason="figures need terragrip[report]")
 
 

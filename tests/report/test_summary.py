@@ -20,6 +20,8 @@ from terragrip.report.from_estimates import report_of
 from terragrip.report.page import Page, Section, Table, render
 from terragrip.report.runs import Run
 
+pytestmark = pytest.mark.usefixtures("one_form")
+
 RATE = 2.0
 """Rows a second of the field day."""
 

@@ -25,6 +25,8 @@ from terragrip.soil.estimates import (
 from terragrip.soil.fit import AdhesionCurve
 from terragrip.vehicle import Vehicle
 
+pytestmark = pytest.mark.usefixtures("one_form")
+
 
 def machine(**more: object) -> Vehicle:
     axles = {
