@@ -32,6 +32,7 @@ def test_an_exact_drive_is_recovered(method):
         assert error.max() < 0.012, (name, error.max())
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("method", METHODS)
 def test_noise_is_averaged_and_within_the_intervals(method):
     noisy = drive(30.0)

@@ -96,6 +96,7 @@ def test_the_bank_has_one_default_of_its_scales():
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("engine", "policy"), METHODS)
 def test_agrees_over_150_steps(engine, policy, problem):
     case = problem(2021, wheels=3, steps=150, condition=1e9, **LONG)

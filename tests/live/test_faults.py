@@ -130,7 +130,7 @@ async def test_what_is_in_the_record_is_the_run_to_the_last_bit(tmp_path, vehicl
         assert np.array_equal(estimates.columns[name], values, equal_nan=True), name
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("seed", range(20))
 async def test_killed_at_any_byte_it_goes_on_as_one_run(tmp_path, vehicle, port, short, seed):
     """The write-ahead file, cut anywhere, is resumed; what is behind the cut is sent again."""
