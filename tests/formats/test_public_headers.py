@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from terragrip.errors import InputError
@@ -300,3 +301,17 @@ def test_the_number_of_a_group_or_sender_is_no_wheel() -> None:
     numbered = ("Speed", "Speed@1", "Speed@2", "Speed@3", "Speed@0A", "Speed@bus4")
     read = columns_of(numbered, {}, {}, GENERAL)
     assert {column.name.wheel for column in read.values()} == {""}
+
+
+def test_a_date_that_never_changes_is_no_time(tmp_path: Path) -> None:
+    """InfluxDB writes when its query began and ended in each row, before _time: inspect proposed the first of them."""
+    began, stamps = (
+        pd.Timestamp("2026-05-01T10:00:00Z"),
+        pd.date_range("2026-05-01T10:00:00Z", periods=200, freq="100ms"),
+    )
+    table = pd.DataFrame(
+        {"_start": began, "_stop": stamps[-1], "_time": stamps, "ground_speed": 1.0 + np.arange(200) % 7}
+    )
+    table["wheel_speed_l"] = 5 * table["ground_speed"]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    assert "time: {from: _time" in inspect(tmp_path / "log.csv").profile

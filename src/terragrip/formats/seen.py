@@ -81,8 +81,11 @@ class Seen:
         }
         log = replace(log, columns={**log.columns, **written, **dated})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
-        dates = tuple(n for n, c in log.columns.items() if c.dtype.kind in "mM")
-        stamp = find_time(numbers, dates, log.units, vocabulary)
+        dates = [n for n, c in log.columns.items() if c.dtype.kind in "mM" and len(c)]
+        dates.sort(
+            key=lambda n: bool((log.columns[n] == log.columns[n][0]).all())
+        )  # when a query began and ended
+        stamp = find_time(numbers, tuple(dates), log.units, vocabulary)
         repeats = Repeats()
         if stamp is not None and stamp.name in orders:
             problem = (doubt(texts[stamp.name]) or (0, "", ""))[1]
