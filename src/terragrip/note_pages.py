@@ -58,6 +58,7 @@ PAGES = (
     ("its sign is wrong there, ", "checks#a-part-of-the-drive"),
     ("while all other torques are not", "checks#channels-that-are-dead-held-or-cut"),
     ("the logger hung, it seems", "checks#channels-that-are-dead-held-or-cut"),
+    ("for the next pulse", "checks#channels-that-are-dead-held-or-cut"),
     ("as pulses counted in each row", "checks#channels-that-are-dead-held-or-cut"),
     ("while it keeps one value", "checks#channels-that-are-dead-held-or-cut"),
     ("a code for ", "formats#in-a-profile"),

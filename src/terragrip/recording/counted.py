@@ -1,4 +1,5 @@
-"""Wheel speeds that are the pulses counted in each row: where the teeth are few, a row has one or none, and does not show the speed."""
+"""Wheel speeds that are the pulses counted in each row: where the teeth are few, a row has one or none, and does not show the speed; or of
+the time between pulses, which keep their last value where none comes."""
 
 from __future__ import annotations
 
@@ -20,6 +21,8 @@ _ZEROS = 0.1  # of the rows at speed: with fewer, a row is off by a part of the 
 _FEWEST = 20  # pulses
 _WAITS = 4.0  # times the usual wait for a pulse: longer ones are rare
 _RARE = 0.1  # share of the pulses
+_STANDS, _KEPT = 0.1, 2.0  # of the usual speed, and s
+_UNLIKE, _FINE = 3, 30.0  # values, of all wheels and stops, and their least size in steps of the channel
 _PULSES, _SHORTEST = 5, 0.5  # in a window, and its least length [s]
 
 
@@ -27,6 +30,34 @@ def counted_warnings(recording: Recording) -> list[str]:
     """A sentence on each wheel speed that is counted in pulses, of which a row has one or none."""
     found = _counted(recording)
     return [f"column {name}: {_problem(step)}; {_fix(name, window)}." for name, step, window in found]
+
+
+def waiting_warnings(recording: Recording) -> list[str]:
+    """A sentence on wheel speeds that keep the value of their last pulse while the vehicle stands, another one each time."""
+    ground = recording.channels.get("ground_speed")
+    if ground is None or np.isfinite(ground).sum() < 2:
+        return []
+    at, speed = known_part(recording.time, np.abs(ground))
+    found: dict[str, set[float]] = {}
+    for name in rim_names(recording.channels):
+        when, what = measured_part(recording.time, np.abs(recording.channels[name]))
+        starts = np.flatnonzero(np.diff(what, prepend=np.nan))
+        counts = np.diff(starts, append=len(what))
+        lasts = when[starts + counts - 1] - when[starts]
+        long = (lasts > _KEPT) & (counts > _PULSES) & (what[starts] > 0.0)
+        if not long.any():
+            continue
+        slow = np.add.reduceat(np.interp(when, at, speed), starts) / counts < _STANDS * quantile(speed, 0.95)
+        kept = what[starts][long & slow]
+        kept = kept[kept > _FINE * quantum(what)]  # a wheel that spins evenly keeps a coarse value, too
+        if len(kept) > np.sum(long & ~slow):  # else the logger repeats values, driving or not
+            found[name] = set(kept.tolist())
+    if len(set().union(*found.values())) < _UNLIKE:
+        return []
+    return [
+        f"{', '.join(found)}: while the vehicle stands each keeps one value for seconds, not 0, and another one each time: they wait for "
+        "the next pulse, it seems, and a stop may be called stuck. Let them read 0 where none comes, or leave these cells empty."
+    ]
 
 
 def refuse_counted(recording: Recording) -> None:

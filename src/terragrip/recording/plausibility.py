@@ -19,7 +19,7 @@ from terragrip.recording.axles import axle_warnings, free_axle_warnings
 from terragrip.recording.brake import without_braked_torques
 from terragrip.recording.codes import without_codes
 from terragrip.recording.copies import copy_warnings, replay_warnings
-from terragrip.recording.counted import counted_warnings
+from terragrip.recording.counted import counted_warnings, waiting_warnings
 from terragrip.recording.doubled import doubled_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
@@ -275,6 +275,7 @@ _EACH = (
     Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
     Check("counted", lambda log: counted_warnings(log.whole), _TIME, needs_wheels=False),
     Check("frozen", lambda log: frozen_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
+    Check("waiting", lambda log: waiting_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("doubled", lambda log: doubled_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("dropouts", lambda log: dropout_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("cut", lambda log: cut_warnings(log.whole), (*_TIME, "frozen"), needs_wheels=False),
