@@ -81,10 +81,9 @@ class Seen:
         }
         log = replace(log, columns={**log.columns, **written, **dated})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
-        dates = [n for n, c in log.columns.items() if c.dtype.kind in "mM" and len(c)]
-        dates.sort(
-            key=lambda n: bool((log.columns[n] == log.columns[n][0]).all())
-        )  # when a query began and ended
+        stamps = {n: c for n, c in log.columns.items() if c.dtype.kind in "mM" and len(c)}
+        # One that never changes says when a query began or ended.
+        dates = sorted(stamps, key=lambda n: bool((stamps[n] == stamps[n][0]).all()))
         stamp = find_time(numbers, tuple(dates), log.units, vocabulary)
         repeats = Repeats()
         if stamp is not None and stamp.name in orders:
