@@ -314,6 +314,33 @@ def test_packed_numbers_of_netcdf_are_unpacked_and_fill_values_are_missing(tmp_p
 
 
 @pytest.mark.parametrize(
+    ("attribute", "missing"), [(-999.9, [3, 9]), (np.array([-999.9, -888.8]), [3, 5, 9])], ids=["one", "two"]
+)
+def test_fill_values_beside_single_numbers_are_missing(
+    tmp_path: Path, attribute: float | np.ndarray, missing: list[int]
+) -> None:
+    """-999.9, which a script writes as a double, is no single number: it was a speed; so were several missing values."""
+    stored = SPEED.astype(np.float32)
+    stored[[3, 9]], stored[5] = -999.9, -888.8
+    with h5py.File(tmp_path / "log.nc", "w") as file:
+        for name, values in {"time": TIME, **OURS}.items():
+            file.create_dataset(name, data=stored if name == "ground_speed" else values)
+        file["ground_speed"].attrs["missing_value"] = attribute
+    found = read_table(tmp_path / "log.nc").columns["ground_speed"]
+    assert np.flatnonzero(np.isnan(found)).tolist() == missing
+
+
+def test_attributes_that_nothing_reads_are_left_alone(tmp_path: Path) -> None:
+    """One of a kind that h5py does not have made a file 'damaged'."""
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in {"time": TIME, **OURS}.items():
+            file.create_dataset(name, data=values)
+        scalar = h5py.h5s.create(h5py.h5s.SCALAR)
+        h5py.h5a.create(file["ground_speed"].id, b"when", h5py.h5t.UNIX_D32LE, scalar)
+    assert np.array_equal(read_table(tmp_path / "log.h5").columns["ground_speed"], OURS["ground_speed"])
+
+
+@pytest.mark.parametrize(
     ("nested", "key"), [("", "units"), ("log/", "units"), ("", "unit"), ("log/", "Unit")]
 )
 def test_units_among_the_attributes_of_hdf5_are_used(tmp_path: Path, nested: str, key: str) -> None:

@@ -6,6 +6,7 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -146,6 +147,21 @@ def test_a_torque_in_per_cent_asks_for_its_scale_and_its_profile_loads(tmp_path:
     recording = read(tmp_path / "log.csv", tmp_path / "p.yaml")
     assert not any("a scale of 1" in note for note in recording.notes)
     np.testing.assert_allclose(recording["drive_torque_r"], 1.5 * columns[name.format("r")])
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        {"sum_of": {"current_a": 2.1, "current_b": 2.1}},
+        {"from": "current_power", "over": "wheel_speed_l", "over_minimum": 0.3},
+    ],
+)
+def test_torques_whose_factors_stand_elsewhere_are_not_asked_for_a_scale(source: dict[str, Any]) -> None:
+    columns = {name: np.sin(TIME) + 2 for name in ("current_a", "current_b", "current_power")}
+    table = pd.DataFrame({"time": TIME, "wheel_speed_l": 5.0 + TIME, "ground_speed": 1 + TIME / 5, **columns})
+    channels = {"ground_speed": "ground_speed", "wheel_speed_l": "wheel_speed_l"}
+    profile = Profile.from_dict({"channels": {**channels, "drive_torque_l": {**source, "unit": "N m"}}})
+    assert not any("a scale of 1" in note for note in read(table, profile).notes)
 
 
 def test_a_proposed_profile_fits_a_new_vehicle_with_a_wheel_a_side(tmp_path: Path) -> None:

@@ -47,3 +47,28 @@ def test_wheels_that_spin_are_not(factor: np.ndarray | float) -> None:
 def test_all_wheels_at_once_are_a_start() -> None:
     rims = {f"wheel_speed_{w}": np.where((TIME >= 30) & (TIME < 34), 2, 1) * SPEED for w in ("l", "r")}
     assert doubled_warnings(Recording(TIME, rims)) == []
+
+
+@pytest.mark.parametrize("inner", [1 / 2, 2 / 3])
+@pytest.mark.parametrize("wheels", [("l", "r"), ("fl", "fr", "rl", "rr")])
+def test_turns_whose_inner_wheels_are_half_as_fast_are_not(inner: float, wheels: tuple[str, ...]) -> None:
+    """Of a robot that begins a turn within a sample each wheel was named, the outer ones as twice and the inner ones as half."""
+    turns = (TIME >= 30) & (TIME < 34)
+    left, right = (np.where(turns, part, 1.0) for part in (inner, 2 * inner))
+    rims = {f"wheel_speed_{w}": left if w.endswith("l") else right for w in wheels}
+    assert doubled_warnings(Recording(TIME, {"ground_speed": (left + right) / 2, **rims})) == []
+
+
+def test_of_two_wheels_the_ground_shows_which_one() -> None:
+    """Both were named, one as twice as fast, the other as half."""
+    rims = {"wheel_speed_l": SPEED, "wheel_speed_r": np.where((TIME >= 30) & (TIME < 34), 2, 1) * SPEED}
+    notes = doubled_warnings(Recording(TIME, {"ground_speed": SPEED / 6, **rims}))
+    assert [note.split()[0] for note in notes] == ["wheel_speed_r"]
+
+
+def test_wheels_held_at_unlike_instants_are_not() -> None:
+    """A start in which one wheel's value came half a second before the others'."""
+    speed = np.interp(TIME, [20.8, 20.9], [1, 2])
+    at = {w: np.floor(TIME - k / 4) + k / 4 for k, w in enumerate(("fl", "fr", "rl", "rr"))}
+    rims = {f"wheel_speed_{w}": np.interp(when, TIME, speed) for w, when in at.items()}
+    assert doubled_warnings(Recording(TIME, rims)) == []

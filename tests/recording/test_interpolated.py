@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from terragrip.estimation import estimate
+from terragrip.estimation.engine import EVENTS
 from terragrip.recording import Recording, unit_warnings
 from terragrip.recording.interpolated import lines_in, lines_of, without_lines
 from terragrip.vehicle import Vehicle
 
 TIME = 0.05 * np.arange(2400)
 DRAWS = np.random.default_rng(13)
+AXLE = {"mass": 100, "wheels": ["l", "r"]}
+VEHICLE = Vehicle.from_dict({"mass": 100, "axles": {"a": AXLE}, "wheel": {"radius": 0.2, "inertia": 0.1}})
 SPEED = 1.5 + np.sin(TIME / 5) + 0.03 * DRAWS.standard_normal(len(TIME))
 
 
@@ -59,12 +62,26 @@ def test_one_value_in_each_period_is_left(hertz: float, part: slice) -> None:
 
 
 def test_estimates_are_those_of_one_value_in_each_period() -> None:
-    axle = {"mass": 100, "wheels": ["l", "r"]}
-    vehicle = Vehicle.from_dict({"mass": 100, "axles": {"a": axle}, "wheel": {"radius": 0.2, "inertia": 0.1}})
     rims = {f"{q}_{w}": k * SPEED for w in "lr" for q, k in (("wheel_speed", 5.5), ("drive_torque", 10.0))}
     log = Recording(TIME, {"ground_speed": np.interp(TIME, TIME[::20], SPEED[::20]), **rims})
-    found, due = (estimate(one, vehicle) for one in (log, without_lines(log, lines_in(log))))
+    found, due = (estimate(one, VEHICLE) for one in (log, without_lines(log, lines_in(log))))
     np.testing.assert_allclose(
         found["slip_l_std"], due["slip_l_std"], rtol=0.02
     )  # their lags differ a little
     assert np.isnan(without_lines(log, lines_in(log))["ground_speed"]).mean() > 0.9
+
+
+@pytest.mark.parametrize("period", [3.0, 5.0])
+def test_samples_that_are_far_apart_leave_no_gaps(period: float) -> None:
+    """5 s apart, or a simulation by ramps without noise: slip was .7 +- 1 for .05, and a gap in 61 % of the rows."""
+    at = np.arange(0, 125, period)
+    time = np.arange(0, 120, 0.05)
+    speed = np.interp(time, at, 1.5 + DRAWS.uniform(-1, 1, len(at)))
+    rims = {f"wheel_speed_{w}": speed / 0.2 / 0.95 for w in "lr"}
+    log = Recording(
+        time, {"ground_speed": speed, **rims, **{f"drive_torque_{w}": 20 + 3 * speed for w in "lr"}}
+    )
+    assert len(lines_in(log)) == 5
+    found = estimate(log, VEHICLE)
+    assert not np.any(found.event_codes == EVENTS.index("gap"))
+    assert np.median(found["slip_l"]) == pytest.approx(0.05, abs=0.02)

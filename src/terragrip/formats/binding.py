@@ -111,8 +111,13 @@ def _is_unscaled(source: Source, log: LogTable) -> bool:
     """Whether a torque is a share or a current as the log has it: a proposed profile, for one, whose scale was not filled in."""
     names = [GENERAL.read(column) for column in source.columns]
     units = {log.units.get(c) or name.unit for c, name in zip(source.columns, names, strict=True)}
-    return abs(source.scale) == 1.0 and (
-        bool(units & _NO_TORQUE) or any(name.has("current") and not name.has("torque") for name in names)
+    factors = (source.scale, *(source.sum_of or {}).values())
+    return (
+        source.over is None
+        and all(abs(factor) == 1.0 for factor in factors)
+        and (
+            bool(units & _NO_TORQUE) or any(name.has("current") and not name.has("torque") for name in names)
+        )
     )
 
 

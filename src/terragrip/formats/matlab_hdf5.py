@@ -14,6 +14,8 @@ from terragrip.recording.frames import stated_unit
 
 _DEEPEST = 12
 _USER_BLOCK, _HDF5 = 512, b"\x89HDF\r\n\x1a\n"
+_PACKING = {"scale_factor": 1.0, "add_offset": 0.0}
+_MISSING = ("_FillValue", "missing_value")
 
 
 def is_hdf5(path: str) -> bool:
@@ -102,9 +104,17 @@ def _array_of_hdf5(item: Any, *, turned: bool) -> Array:
 
 def _packing_of(item: Any) -> Callable[[npt.NDArray[Any]], npt.NDArray[Any]]:
     """How a dataset's stored numbers become values: the packing and the missing values of netCDF (CF conventions 8.1 and 2.5.1)."""
-    one = {k: v for k, v in item.attrs.items() if np.size(v) == 1 and np.asarray(v).dtype.kind in "fiu"}
-    scale, offset = (float(np.ravel(one.get(k, d))[0]) for k, d in (("scale_factor", 1), ("add_offset", 0)))
-    codes = [np.ravel(one[name])[0] for name in ("_FillValue", "missing_value") if name in one]
-    if not codes and (scale, offset) == (1.0, 0.0):
-        return lambda stored: stored
-    return lambda stored: np.where(np.isin(stored, codes), np.nan, stored * scale + offset)
+    stated = {k: np.ravel(item.attrs[k]) for k in (*_PACKING, *_MISSING) if k in item.attrs}
+    numbers = {k: v for k, v in stated.items() if v.size and v.dtype.kind in "fiu"}
+    scale, offset = (float(numbers[k][0]) if k in numbers else usual for k, usual in _PACKING.items())
+    codes = np.concatenate([np.empty(0, item.dtype), *(numbers[k] for k in _MISSING if k in numbers)])
+    if item.dtype.kind == "f":
+        codes = codes.astype(item.dtype)  # a script writes -999.9 beside single numbers as a double
+
+    def whole(stored: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        missing = np.isin(stored, codes)
+        if not missing.any() and (scale, offset) == (1.0, 0.0):
+            return stored  # whole numbers keep their digits
+        return np.where(missing, np.nan, stored * scale + offset)
+
+    return whole if len(codes) or (scale, offset) != (1.0, 0.0) else lambda stored: stored

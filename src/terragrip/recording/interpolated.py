@@ -25,6 +25,7 @@ _RESOLVED = 5.0  # times what counts as straight, of the bends at the samples
 _STRAIGHT = 0.6  # of the rows whose value changes
 _FEWEST = 20  # samples
 _EVEN = 0.6  # share of their distances that is the usual one, to a row
+_LONGEST = 1.0  # s, half of the usual gap behind which the motion starts anew: farther apart, several values of a line are used
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,8 @@ def interpolated_warnings(recording: Recording) -> list[str]:
     each = ", ".join(f"{name} ({lines.period:.2g} s)" for name, lines in known.items())
     return [
         f"{each}: values lie on straight lines between samples that far apart, so they were interpolated: what lies between is no "
-        "measurement, and estimates leave it out. Better give the log as it was measured, without interpolation (empty cells between the "
-        "samples)."
+        "measurement, and 'estimate' leaves most of it out (a live service does not). Better give the log as it was measured, without "
+        "interpolation (empty cells between the samples)."
     ]
 
 
@@ -57,13 +58,13 @@ def lines_in(recording: Recording) -> dict[str, Lines]:
 
 
 def without_lines(recording: Recording, known: Mapping[str, Lines]) -> Recording:
-    """The recording, or a part of it, with one value of an interpolated channel in each of its periods, the others missing."""
+    """The recording, or a part of it, with one value of an interpolated channel in each of its periods, or second if they are longer, the
+    others missing."""
     channels = dict(recording.channels)
     for name, lines in known.items():
         since = recording.time - lines.first
-        before, after = (
-            np.floor((since + part) / lines.period) for part in (-lines.spacing / 2, lines.spacing / 2)
-        )
+        apart = lines.period / np.ceil(lines.period / _LONGEST - 0.01)
+        before, after = (np.floor((since + part) / apart) for part in (-lines.spacing / 2, lines.spacing / 2))
         channels[name] = np.where(before < after, channels[name], np.nan)
     return replace(recording, channels=channels)
 
