@@ -85,3 +85,13 @@ def test_samples_that_are_far_apart_leave_no_gaps(period: float) -> None:
     found = estimate(log, VEHICLE)
     assert not np.any(found.event_codes == EVENTS.index("gap"))
     assert np.median(found["slip_l"]) == pytest.approx(0.05, abs=0.02)
+
+
+@pytest.mark.parametrize("hertz", [30, 60])
+def test_stamps_in_whole_milliseconds_shift_no_period(hertz: int) -> None:
+    """33 ms between two rows of 30 Hz made it .99 s: in 100 s the values used went through a whole period."""
+    time = np.arange(0, 120, 1 / hertz)
+    drawn = np.interp(time, TIME[::20], SPEED[::20])
+    lines = lines_of(np.round(time, 3), drawn)
+    assert lines is not None
+    assert lines.period == pytest.approx(1, abs=1e-4)

@@ -25,6 +25,7 @@ _RESOLVED = 5.0  # times what counts as straight, of the bends at the samples
 _STRAIGHT = 0.6  # of the rows whose value changes
 _FEWEST = 20  # samples
 _EVEN = 0.6  # share of their distances that is the usual one, to a row
+_STEADY = 10  # periods between two bends: in more, or in a hole of the log, they cannot be counted
 _LONGEST = 1.0  # s, half of the usual gap behind which the motion starts anew: farther apart, several values of a line are used
 
 
@@ -94,5 +95,8 @@ def lines_of(time: Floats, values: Floats) -> Lines | None:
         or median(bend[bent] / straight[bent]) < _RESOLVED
     ):
         return None
-    period = float(np.mean(apart[np.abs(apart - length) <= 1]) * usual)  # 3 Hz at 20 Hz: 6 or 7 rows
-    return Lines(float(time[rows[0] + 1]), period, float(usual))
+    # From bend to bend, since stamps in whole milliseconds make a row of 30 Hz a hundredth too short; 3 Hz at 20 Hz: 6 or 7 rows.
+    between = np.diff(time[rows + 1])
+    counted = np.round(between / (length * usual))
+    near = (counted > 0) & (counted < _STEADY)
+    return Lines(float(time[rows[0] + 1]), float(between[near].sum() / counted[near].sum()), float(usual))
