@@ -91,7 +91,7 @@ def test_slope_and_error_are_those_of_a_regression_and_a_jackknife(climbing: boo
     x, climb = draws.normal(3.0, 1.0, 64), draws.normal(size=64)
     y = 2.0 + 1.5 * x + 0.7 * climb + 0.1 * draws.normal(size=64)
     y[5] = x[9] = np.nan
-    fit = windows(64, climb).fit(y, x, beside_climb=climbing)
+    fit = windows(64, climb).fit(y, x, beside=climb if climbing else None)
     known = np.isfinite(y + x)
     common = np.column_stack([np.ones(62), *((climb[known],) if climbing else ())])
     y, x = (v - common @ np.linalg.lstsq(common, v, rcond=None)[0] for v in (y[known], x[known]))
@@ -111,7 +111,7 @@ def test_under_25_windows_or_without_change_nothing_is_fitted() -> None:
     assert windows(25).fit(x, np.ones(25)) == Fit()
     climb = np.where(x == 3, np.nan, x**2)
     assert windows(25, climb).fit(2 * x, x).slope == pytest.approx(2.0)
-    assert windows(25, climb).fit(2 * x, x, beside_climb=True) == Fit()
+    assert windows(25, climb).fit(2 * x, x, beside=climb) == Fit()
 
 
 @pytest.mark.parametrize(("step", "length"), [(0.1, 1.0), (0.5, 1.0), (1.0, 2.0)])

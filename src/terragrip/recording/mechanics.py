@@ -123,16 +123,15 @@ class Means:
         measured = self.of(recording.channels["acceleration_x"])
         return np.where(np.isnan(measured), moved, measured)
 
-    def fit(self, y: Floats, x: Floats, *, beside_climb: bool = False) -> Fit:
-        """y over x (n,), its error by leaving out one block of windows at a time; ``beside_climb``: without the effect of climbs."""
+    def fit(self, y: Floats, x: Floats, *, beside: Floats | None = None) -> Fit:
+        """y over x (n,), its error by leaving out one block of windows at a time; ``beside``: without the effect of that (n,)."""
         known = np.isfinite(y) & np.isfinite(x)
-        other = self.climb if beside_climb else None
-        if other is not None:
-            known &= np.isfinite(other)
+        if beside is not None:
+            known &= np.isfinite(beside)
         if known.sum() < _LEAST or not np.ptp(y[known]) or not np.ptp(x[known]):
             return Fit()
         pair = np.column_stack([y, x])[known]
-        common = np.column_stack([np.ones(len(pair)), *(() if other is None else (other[known],))])
+        common = np.column_stack([np.ones(len(pair)), *(() if beside is None else (beside[known],))])
         y, x = (pair - common @ np.linalg.lstsq(common, pair, rcond=None)[0]).T
         starts = np.searchsorted(np.arange(len(y)) * _BLOCKS // len(y), np.arange(_BLOCKS))
         sums = np.add.reduceat([np.ones(len(y)), x, y, x * x, x * y], starts, axis=1)
@@ -240,13 +239,13 @@ def _balance_warnings(
     recording: Recording, means: Means, forward: Floats, vehicle: Vehicle | None
 ) -> list[str]:
     """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
-    moved = means.fit(forward, means.change, beside_climb=True)
+    moved = means.fit(forward, means.change, beside=means.climb)
     flat = "acceleration_x is not the change of ground speed"
     backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
     if not means.thrusts or vehicle is None:
         return [_opposite(f"{flat} but its opposite: ")] if backward else []
     thrust = means.thrust
-    driven = means.fit(thrust, means.change, beside_climb=True)
+    driven = means.fit(thrust, means.change, beside=means.climb)
     together = means.fit(thrust, forward)
     exchanged = _exchanged(recording, vehicle, means, forward, together)
     if exchanged:

@@ -47,7 +47,7 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
         shown = "falls where the accelerometer shows a climb"
         sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
-        moved = means.fit(forward, means.change, beside_climb=True)
+        moved = means.fit(forward, means.change, beside=means.climb)
         if moved.slope > _SURE * moved.error:
             return [WrongSign(sentence, ["pitch"], shown)]
         both = "pitch and acceleration_x show opposite climbs"

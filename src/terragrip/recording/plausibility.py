@@ -44,6 +44,7 @@ from terragrip.recording.reverse import against_warnings, reverse_warnings
 from terragrip.recording.rim_noise import noisy_rim_warnings
 from terragrip.recording.rolling import light_warnings, slower_warnings
 from terragrip.recording.sides import exchanged_torques, side_warnings
+from terragrip.recording.sideways import sideways_warnings
 from terragrip.recording.slowing import slowing_warnings
 from terragrip.recording.speed_ratios import drive_train_warnings, position_warnings, rim_warnings
 from terragrip.recording.steering import joint_warnings, steering_warnings
@@ -245,6 +246,12 @@ _EACH = (
         "acceleration",
         lambda log: acceleration_warnings(log.courses),
         (*_COURSES, "signs", "motion"),
+        needs_wheels=False,
+    ),
+    Check(
+        "sideways",
+        lambda log: sideways_warnings(log.rows, log.means, log.turn),
+        (*_WAY, "turn rate", "exchanged wheels", "motion"),
         needs_wheels=False,
     ),
     Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
