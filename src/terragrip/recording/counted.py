@@ -38,7 +38,7 @@ def waiting_warnings(recording: Recording) -> list[str]:
     if ground is None or np.isfinite(ground).sum() < 2:
         return []
     at, speed = known_part(recording.time, np.abs(ground))
-    found: dict[str, set[float]] = {}
+    values: dict[str, set[float]] = {}
     for name in rim_names(recording.channels):
         when, what = measured_part(recording.time, np.abs(recording.channels[name]))
         starts = np.flatnonzero(np.diff(what, prepend=np.nan))
@@ -51,11 +51,11 @@ def waiting_warnings(recording: Recording) -> list[str]:
         kept = what[starts][long & slow]
         kept = kept[kept > _FINE * quantum(what)]  # a wheel that spins evenly keeps a coarse value, too
         if len(kept) > np.sum(long & ~slow):  # else the logger repeats values, driving or not
-            found[name] = set(kept.tolist())
-    if len(set().union(*found.values())) < _UNLIKE:
+            values[name] = set(kept.tolist())
+    if len(set().union(*values.values())) < _UNLIKE:
         return []
     return [
-        f"{', '.join(found)}: while the vehicle stands each keeps one value for seconds, not 0, and another one each time: they wait for "
+        f"{', '.join(values)}: while the vehicle stands each keeps one value for seconds, not 0, and another one each time: they wait for "
         "the next pulse, it seems, and a stop may be called stuck. Let them read 0 where none comes, or leave these cells empty."
     ]
 

@@ -30,13 +30,13 @@ _CLOSE = 0.25  # s between samples: further apart a wheel may spin and grip agai
 def doubled_warnings(recording: Recording) -> list[str]:
     """A sentence on each wheel that goes at twice or half its speed for a while, from one sample to the next."""
     names = rim_names(recording.channels)
-    found = {name: stretch for name in names if (stretch := _stretch(recording, name, names)) is not None}
+    stretches = {name: stretch for name in names if (stretch := _stretch(recording, name, names)) is not None}
     return [
         f"{name} is {'twice' if twice else 'half'} as fast {span(first, last)} as before and after, from one sample to the next, and other "
         f"wheels are not: {'a pulse counts as two' if twice else 'every other pulse is lost'}, it seems, and slip is wrong there. Leave "
         "these cells empty, or correct them."
-        for name, (first, last, twice) in found.items()
-        if sum(begin <= last and first <= end for begin, end, _ in found.values()) == 1
+        for name, (first, last, twice) in stretches.items()
+        if sum(begin <= last and first <= end for begin, end, _ in stretches.values()) == 1
     ]
 
 

@@ -54,8 +54,8 @@ def interpolated_warnings(recording: Recording) -> list[str]:
 def lines_in(recording: Recording) -> dict[str, Lines]:
     """The interpolated speeds and torques of a recording, by channel."""
     wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]
-    found = {name: lines_of(recording.time, recording.channels[name]) for name in wanted}
-    return {name: lines for name, lines in found.items() if lines is not None}
+    every = {name: lines_of(recording.time, recording.channels[name]) for name in wanted}
+    return {name: lines for name, lines in every.items() if lines is not None}
 
 
 def without_lines(recording: Recording, known: Mapping[str, Lines]) -> Recording:
