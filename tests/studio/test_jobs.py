@@ -61,19 +61,27 @@ def test_progress_is_told(client: TestClient) -> None:
     assert states[-1] == "done"
 
 
+@pytest.mark.parametrize(
+    ("error", "hint"),
+    [
+        (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "free memory"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory"), "still there?"),
+    ],
+)
 def test_a_job_that_cannot_be_started_fails_and_the_next_one_runs(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, error: OSError, hint: str
 ) -> None:
     """It ran for ever in the list: its process could not be made, and nobody said so."""
 
     async def none_left(*_: Any, **__: Any) -> None:
-        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+        raise error
 
     with monkeypatch.context() as patch:
         patch.setattr(asyncio, "create_subprocess_exec", none_left)
         job = wait(client, ask(client).json()["id"])
     assert job["state"] == "failed"
-    assert "Resource temporarily unavailable" in job["text"]
+    assert str(error.strerror) in job["text"]
+    assert hint in job["text"]
     assert wait(client, ask(client).json()["id"])["state"] == "done"
 
 

@@ -115,9 +115,9 @@ class Jobs:
                 stderr=asyncio.subprocess.PIPE, limit=1 << 22, cwd=self._folder,
             )  # fmt: skip
         except OSError as error:
-            self._end(
-                job, "failed", f"could not be started ({error.strerror}): free memory, or end other programs"
-            )
+            gone = isinstance(error, FileNotFoundError)
+            hint = f"is {self._folder} still there?" if gone else "free memory, or end other programs"
+            self._end(job, "failed", f"could not be started ({error.strerror}): {hint}")
             return
         self._process = process
         assert process.stdout is not None
