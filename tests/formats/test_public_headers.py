@@ -303,15 +303,20 @@ def test_the_number_of_a_group_or_sender_is_no_wheel() -> None:
     assert {column.name.wheel for column in read.values()} == {""}
 
 
-def test_a_date_that_never_changes_is_no_time(tmp_path: Path) -> None:
+@pytest.mark.parametrize("missing", [0, 3])
+@pytest.mark.parametrize("proper", ["_time", "t [s]"])
+def test_a_date_that_never_changes_is_no_time(tmp_path: Path, missing: int, proper: str) -> None:
     """InfluxDB writes when its query began and ended in each row, before _time: inspect proposed the first of them."""
     began, stamps = (
         pd.Timestamp("2026-05-01T10:00:00Z"),
         pd.date_range("2026-05-01T10:00:00Z", periods=200, freq="100ms"),
     )
     table = pd.DataFrame(
-        {"_start": began, "_stop": stamps[-1], "_time": stamps, "ground_speed": 1.0 + np.arange(200) % 7}
+        {"_start": began, "_stop": stamps[-1], proper: stamps, "ground_speed": 1.0 + np.arange(200) % 7}
     )
+    table.loc[: missing - 1, "_start"] = pd.NaT
+    if proper == "t [s]":
+        table[proper] = 0.1 * np.arange(200)
     table["wheel_speed_l"] = 5 * table["ground_speed"]
     table.to_csv(tmp_path / "log.csv", index=False)
-    assert "time: {from: _time" in inspect(tmp_path / "log.csv").profile
+    assert f"time: {{from: {proper.split()[0]}" in inspect(tmp_path / "log.csv").profile

@@ -81,10 +81,10 @@ class Seen:
         }
         log = replace(log, columns={**log.columns, **written, **dated})
         numbers = {n: c.astype(np.float64) for n, c in log.columns.items() if c.dtype.kind in "fiub"}
-        stamps = {n: c for n, c in log.columns.items() if c.dtype.kind in "mM" and len(c)}
-        # One that never changes says when a query began or ended.
-        dates = sorted(stamps, key=lambda n: bool((stamps[n] == stamps[n][0]).all()))
-        stamp = find_time(numbers, tuple(dates), log.units, vocabulary)
+        stamps = {n: c[~np.isnat(c)] for n, c in log.columns.items() if c.dtype.kind in "mM"}
+        # One that never changes is a day, or when a query began or ended.
+        dates = tuple(n for n, c in stamps.items() if (c != c[:1]).any())
+        stamp = find_time(numbers, dates, log.units, vocabulary)
         repeats = Repeats()
         if stamp is not None and stamp.name in orders:
             problem = (doubt(texts[stamp.name]) or (0, "", ""))[1]
