@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terragrip.arrays import Floats
-from terragrip.recording.held import measured_part, quantum
+from terragrip.recording.held import measurable, measured_part, quantum
 from terragrip.recording.ranks import median
 from terragrip.recording.schema import speed_names
 
@@ -72,7 +72,7 @@ def without_lines(recording: Recording, known: Mapping[str, Lines]) -> Recording
 
 def lines_of(time: Floats, values: Floats) -> Lines | None:
     """The samples of an interpolated channel (n,); None of one that has noise of its own, or is too coarse to tell."""
-    time, values = measured_part(time, values)
+    time, values = measured_part(time, measurable(values))
     if len(values) < 3 * _FEWEST:
         return None
     steps, usual = np.diff(values), median(np.diff(time))
