@@ -24,6 +24,7 @@ _DIGITS = 2.1  # quanta that a change of two steps on a line may be rounded by
 _RESOLVED = 5.0  # times what counts as straight, of the bends at the samples
 _STRAIGHT = 0.6  # of the rows whose value changes
 _FEWEST = 20  # samples
+_STRETCH = 512  # rows
 _EVEN = 0.6  # share of their distances that is the usual one, to a row
 _STEADY = 10  # periods between two bends: in more, or in a hole of the log, they cannot be counted
 _LONGEST = 1.0  # s, half of the usual gap behind which the motion starts anew: farther apart, several values of a line are used
@@ -72,6 +73,8 @@ def without_lines(recording: Recording, known: Mapping[str, Lines]) -> Recording
 
 def lines_of(time: Floats, values: Floats) -> Lines | None:
     """The samples of an interpolated channel (n,); None of one that has noise of its own, or is too coarse to tell."""
+    if _is_noisy(values):
+        return None
     time, values = measured_part(time, measurable(values))
     if len(values) < 3 * _FEWEST:
         return None
@@ -100,3 +103,14 @@ def lines_of(time: Floats, values: Floats) -> Lines | None:
     counted = np.round(between / (length * usual))
     near = (counted > 0) & (counted < _STEADY)
     return Lines(float(time[rows[0] + 1]), float(between[near].sum() / counted[near].sum()), float(usual))
+
+
+def _is_noisy(values: Floats) -> bool:
+    """Whether eight stretches of a long channel (n,) bend in most rows that change: a tenth of the work that the whole is."""
+    parts = values[: len(values) // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
+    some = parts[:: max(1, len(parts) // 8)].ravel()
+    some = some[np.isfinite(measurable(some))]
+    steps = np.diff(some)
+    moves = (steps[1:] != 0) & (steps[:-1] != 0)
+    bent = np.abs(np.diff(steps)) > _DIGITS * quantum(some) + 2e-3 * np.abs(steps[1:])
+    return bool(moves.sum() > _STRETCH and np.mean(bent[moves]) > 1 - _STRAIGHT / 2)
