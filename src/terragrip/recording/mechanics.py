@@ -61,6 +61,11 @@ class Fit:
         return abs(self.slope - value) > _SURE * self.error
 
     @property
+    def is_opposite(self) -> bool:
+        """Proportional, with a factor that is certainly negative."""
+        return self.alike < -_ALIKE and self.slope + _SURE * self.error < 0
+
+    @property
     def distance(self) -> float:
         """How far the slope is from 1, as a factor's logarithm."""
         return abs(float(np.log(self.slope))) if self.slope > 0 else np.inf

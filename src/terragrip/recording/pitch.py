@@ -44,7 +44,7 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
         return []
     observed = forward - means.change
     fit = means.fit(observed, means.climb)
-    if fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0:
+    if fit.is_opposite:
         shown = "falls where the accelerometer shows a climb"
         sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
         moved = means.fit(forward, means.change, beside=means.climb)

@@ -14,10 +14,9 @@ from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from terragrip.recording.mechanics import Fit, Means
+    from terragrip.recording.mechanics import Means
     from terragrip.recording.table import Recording
 
-_ALIKE = 0.7  # correlation from which two signals are proportional
 _SURE = 3.0  # standard errors
 
 
@@ -31,11 +30,11 @@ def sideways_warnings(recording: Recording, means: Means | None, turn: Floats | 
     turning = still if turn is None else means.speed * np.nan_to_num(means.of(turn))
     leaning = still if roll is None else STANDARD_GRAVITY * means.of(np.sin(roll))
     by_turns, by_roll = means.fit(felt, turning, beside=leaning), means.fit(felt, leaning, beside=turning)
-    if _is_opposite(by_turns):
+    if by_turns.is_opposite:
         shown = "falls in turns to the left"
         sentence = f"acceleration_y {shown}: left is positive; write 'sign: -1' for it in the profile."
         return [WrongSign(sentence, ["acceleration_y"], shown)]
-    if not _is_opposite(by_roll):
+    if not by_roll.is_opposite:
         return []
     if by_turns.slope > _SURE * by_turns.error:
         shown = "falls where acceleration_y shows the left side up"
@@ -46,7 +45,3 @@ def sideways_warnings(recording: Recording, means: Means | None, turn: Floats | 
         f"{both}: left, and left side up, are positive; write 'sign: -1' for one of them in the profile."
     )
     return [WrongSign(sentence, ["roll", "acceleration_y"], both, sure=False)]
-
-
-def _is_opposite(fit: Fit) -> bool:
-    return fit.alike < -_ALIKE and fit.slope + _SURE * fit.error < 0
