@@ -140,3 +140,33 @@ def test_accelerations_of_a_frame_with_z_down_are_asked_for(tmp_path: Path, down
     found = inspected(tmp_path, drive() | imu, known=True).proposals
     assert [bool(found[f"acceleration_{a}"].doubt) for a in "yz"] == [down, down]
     assert ("z rests at -g" in found["acceleration_y"].doubt) is down
+
+
+IN_MOST = "negative in most of the drive"
+
+
+@pytest.mark.parametrize(
+    ("negative", "ahead", "asked"),
+    [(1.0, 1.0, True), (0.8, 1.0, True), (0.7, 1.0, False), (0.0, 1.0, False), (1.0, -1.0, False)],
+)
+def test_a_drawbar_force_is_asked_for_where_most_large_values_are_negative_in_a_drive_ahead(
+    tmp_path: Path, negative: float, ahead: float, asked: bool
+) -> None:
+    """No torque decides; what hangs idle in the other half of the log reads little, of the other sign, and does not count."""
+    pulls = np.arange(len(TIME)) % 2 == 0
+    sign = np.where(np.arange(len(TIME)) % 20 < round(20 * negative), -1.0, 1.0)
+    columns = {n: v * (ahead if n in ("GPS speed [m/s]", *SPEEDS) else 1.0) for n, v in drive().items()}
+    columns = {n: v for n, v in columns.items() if n not in TORQUES}
+    columns[PULL] = np.where(pulls, sign * columns[PULL], -0.2 * sign * columns[PULL])
+    proposal = inspected(tmp_path, columns, known=False).proposals["drawbar_force"]
+    assert (IN_MOST in proposal.doubt) is asked
+
+
+def test_a_drawbar_force_is_asked_for_however_small_it_is_beside_the_torques(tmp_path: Path) -> None:
+    """A torque that is small beside the others' may be a free wheel's offset; and the force's size says nothing of the torques'."""
+    unlike = 8 + np.sin(TIME / 3)  # so that none of the two shows the sign of the other
+    negative = drive() | dict.fromkeys(TORQUES, -unlike) | {TORQUES[0]: -0.1 * unlike}
+    for size in (0.1, 300.0):
+        found = inspected(tmp_path, negative | {PULL: -size * unlike[::-1]}, known=False).proposals
+        asked = {channel for channel, proposal in found.items() if IN_MOST in proposal.doubt}
+        assert asked == {"drawbar_force", *(f"drive_torque_{w}" for w in ("fr", "rl", "rr"))}

@@ -61,6 +61,17 @@ def test_one_value_in_each_period_is_left(hertz: float, part: slice) -> None:
     assert without_lines(log, {})["ground_speed"] is log["ground_speed"]
 
 
+@pytest.mark.parametrize("every", [0, 80, 20])
+def test_the_note_comes_where_the_estimate_leaves_values_out(every: int) -> None:
+    """Of a speed with a code between its samples the note was made without the code, and said what the estimate did not do."""
+    drawn = np.interp(TIME, TIME[::20], SPEED[::20])
+    if every:
+        drawn[7::every] = 9999.0
+    log = Recording(TIME, {"ground_speed": drawn, "wheel_speed_l": 5 * SPEED, "wheel_speed_r": 5 * SPEED})
+    named = any("'estimate' leaves most of it out" in note for note in unit_warnings(log, None))
+    assert named is bool(lines_in(log))
+
+
 def test_estimates_are_those_of_one_value_in_each_period() -> None:
     rims = {f"{q}_{w}": k * SPEED for w in "lr" for q, k in (("wheel_speed", 5.5), ("drive_torque", 10.0))}
     log = Recording(TIME, {"ground_speed": np.interp(TIME, TIME[::20], SPEED[::20]), **rims})

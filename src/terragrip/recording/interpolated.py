@@ -14,6 +14,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.held import measurable, measured_part, quantum
+from terragrip.recording.once import once
 from terragrip.recording.ranks import median
 from terragrip.recording.schema import speed_names
 
@@ -52,6 +53,7 @@ def interpolated_warnings(recording: Recording) -> list[str]:
     ]
 
 
+@once  # of one log the estimate asks first, and then its note
 def lines_in(recording: Recording) -> dict[str, Lines]:
     """The interpolated speeds and torques of a recording, by channel."""
     wanted = [n for n in recording.channels if n in speed_names(recording.channels) or "drive_torque_" in n]

@@ -88,13 +88,14 @@ def wrong_signs(recording: Recording, vehicle: Vehicle | None) -> list[WrongSign
 class _Log:
     """A log and what several checks look at; each is computed when it is first asked for.
 
-    ``whole`` are its rows without codes for missing values, ``rows`` their means where they are finer than any check needs.
+    ``recording`` is the log as given, which the estimate reads; ``whole`` are its rows without codes for missing values, ``rows`` their
+    means where they are finer than any check needs.
     """
 
     def __init__(self, recording: Recording, vehicle: Vehicle | None) -> None:
         channels = {name: measurable(values) for name, values in recording.channels.items()}
         self.whole, self.codes = without_codes(replace(recording, channels=channels), vehicle)
-        self.any_vehicle = vehicle
+        self.recording, self.any_vehicle = recording, vehicle
         self.knows_wheels = vehicle is not None and vehicle.knows_wheels
         self._found: dict[str, list[str]] = {}
 
@@ -299,7 +300,7 @@ _EACH = (
     Check("codes", lambda log: log.codes, needs_wheels=False),
     Check("odometry", lambda log: odometry_warnings(log.whole, log.vehicle)),
     Check("vehicle", lambda log: size_warnings(log.any_vehicle), needs_wheels=False),
-    Check("interpolated", lambda log: interpolated_warnings(log.whole), _TIME, needs_wheels=False),
+    Check("interpolated", lambda log: interpolated_warnings(log.recording), _TIME, needs_wheels=False),
     Check("spacing", lambda log: spacing_warnings(log.whole), _TIME, needs_wheels=False),
 )
 _ALL = tuple(check.name for check in _EACH)
