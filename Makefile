@@ -26,7 +26,7 @@ KERNEL_TESTS := $(patsubst kernel/tests/%.c,%,$(wildcard kernel/tests/*.c))
 BUILD_INPUTS := pyproject.toml setup.py cffi_build.py $(KERNEL_SOURCES) $(KERNEL_HEADERS) \
 	$(wildcard kernel/python/*.[ch] src/terragrip/*/*.c src/terragrip/*/*.h)
 
-.PHONY: beside-long pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
+.PHONY: beside-long browser-test pytest-long notebooks soak soak-short help demo test lint kernel-test web-test pytest studio wheel docs system bench lock clean sbom audit \
 	kernel-aarch64 kernel-others test-long kernel-sanitized fuzz system-fuzz fuzz-kernel fuzz-kernel-run fuzz-parsers kills
 
 help: ## show this list
@@ -195,7 +195,10 @@ test-long: beside-long kills soak-short ## every C test under the address and un
 beside-long:
 	@$(MAKE) $(AT_ONCE) kernel-sanitized pytest-long fuzz
 
-pytest-long: $(VENV)/package $(VENV)/dev studio ## the Python tests marked long, but for the kills: what shorter tests show too
+browser-test: $(VENV)/package $(VENV)/dev studio system ## every test of the pages in a browser: `make test` runs their main ways, `make test-long` the rest
+	$(PYTEST) $(WORKERS) -m "long or not long" tests/studio/test_browser*.py
+
+pytest-long: $(VENV)/package $(VENV)/dev studio system ## the Python tests marked long, but for the kills: what shorter tests show too
 	$(PYTEST) $(WORKERS) -m long --deselect tests/test_kills.py
 
 kills: $(VENV)/package $(VENV)/dev ## kill -9 a hundred times during estimate, soils, a fit saved and an upload

@@ -30,6 +30,8 @@ NEEDS = [
     # playwright's loop and sockets are still open when pytest looks for what was left behind
     pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
+# The details of pages whose main ways are in test_browser.py: of `make test-long` and `make browser-test`
+DETAILS = [*NEEDS, pytest.mark.long]
 
 
 def leave(tab: Any) -> None:

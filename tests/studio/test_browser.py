@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -429,6 +430,32 @@ def test_the_map_draws_the_track_and_changes_its_colours(page: Any, served: Serv
     assert "grass" in page.inner_text(".legend-row")
     drawn = "() => getComputedStyle(document.querySelector('.legend-row .strip')).backgroundColor"
     assert page.evaluate(drawn) not in ("rgba(0, 0, 0, 0)", "transparent")
+
+
+def test_a_map_is_made_from_the_page_and_opened(
+    page: Any, served: Served, folder: Path, field_maps: Path
+) -> None:
+    geopandas = pytest.importorskip("geopandas", reason="maps need terragrip[geo]")
+    for file in field_maps.iterdir():
+        shutil.copy(file, folder)
+    page.goto(f"{served.url}/#/map?path=monday.parquet")
+    page.wait_for_selector("#map-make:enabled")
+    page.click("#map-make")
+    page.fill("#job-cell", "2")
+    page.fill("#job-slip", "15")
+    page.click("#job-go")
+    page.wait_for_selector("#map[data-cells]", timeout=240_000)
+    assert "monday-map.gpkg" in page.evaluate("() => decodeURIComponent(location.hash)")
+    assert "Adhesion µ at 15 % slip" in page.inner_text("#field-panel")
+    page.click(".about-map summary")
+    command = page.inner_text(".about-map code")
+    assert command == "terragrip map monday.parquet --cell=2 --slip=0.15 --output monday-map.gpkg"
+    cells = geopandas.read_file(folder / "monday-map.gpkg", layer="cells")
+    page.wait_for_selector(f"#map[data-cells='{int(cells.adhesion.notna().sum())}']")
+    page.click("nav >> text=Folder")
+    page.click("section[aria-label='Maps'] >> text=once.gpkg")
+    page.wait_for_selector("#map[data-cells]")
+    assert page.input_value("#map-run") == "once.gpkg"
 
 
 def test_a_brush_is_the_same_on_drive_and_map_and_in_another_tab(page: Any, served: Served) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from live_service import listened_to
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.cli import main
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 
 def test_the_panel_of_drive_shows_the_best_slip_and_what_to_do(

@@ -12,11 +12,11 @@ import polars as pl
 import pytest
 
 import terragrip as tg
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 COUNT = """([shade, number]) => {
   const canvas = [...document.querySelectorAll(".chart")].at(number).querySelector("canvas");

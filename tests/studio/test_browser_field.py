@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served, axe_violations
+from served import DETAILS, Served, axe_violations
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
 geopandas = pytest.importorskip("geopandas", reason="maps need terragrip[geo]")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 PICKED = """() => {
   const { read, picked } = window.terragripField;
@@ -191,26 +191,6 @@ def test_a_map_that_is_gone_opens_no_other(page: Any, served: Served) -> None:
     page.select_option("#map-run", "once.gpkg")
     page.wait_for_selector("#map[data-cells]")
     assert page.locator("#map-empty").count() == 0
-
-
-def test_a_map_is_made_from_the_page_and_opened(page: Any, served: Served, folder: Path) -> None:
-    page.goto(f"{served.url}/#/map?path=monday.parquet")
-    page.wait_for_selector("#map-make:enabled")
-    page.click("#map-make")
-    page.fill("#job-cell", "2")
-    page.fill("#job-slip", "15")
-    page.click("#job-go")
-    page.wait_for_selector("#map[data-cells]", timeout=240_000)
-    assert "monday-map.gpkg" in page.evaluate("() => decodeURIComponent(location.hash)")
-    assert "Adhesion µ at 15 % slip" in page.inner_text("#field-panel")
-    page.click(".about-map summary")
-    command = page.inner_text(".about-map code")
-    assert command == "terragrip map monday.parquet --cell=2 --slip=0.15 --output monday-map.gpkg"
-    drawn(page, int(cells_of(folder, "monday-map.gpkg").adhesion.notna().sum()))
-    page.click("nav >> text=Folder")
-    page.click("section[aria-label='Maps'] >> text=once.gpkg")
-    page.wait_for_selector("#map[data-cells]")
-    assert page.input_value("#map-run") == "once.gpkg"
 
 
 def test_what_is_shown_is_saved(page: Any, served: Served, folder: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import terragrip as tg
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.estimation import Estimates
 from terragrip.physics.adhesion import CURVES
 from terragrip.soil.bins import BY_SLIP, BinSettings
@@ -20,7 +20,7 @@ from terragrip.soil.estimates import soils_of
 from terragrip.soil.fit import AdhesionCurve
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 BINS = "() => window.terragripFit.state.soils[0].bins"
 RIGHT = "() => { const r = window.terragripFit.residuals.summary; return r.count ? r : null; }"

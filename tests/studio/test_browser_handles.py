@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served, until
+from served import DETAILS, Served, until
 from terragrip.physics.adhesion import CURVES
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 PARAMETERS = "() => window.terragripFit.state.active.parameters"
 TRUE = {"c1": 0.6, "c2": 12.0, "c3": 0.3}

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from served import NEEDS, Served
+from served import DETAILS, Served
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 FOCUSED = "() => document.activeElement === document.body ? 'body' : document.activeElement.textContent"
 

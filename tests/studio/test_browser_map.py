@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served, leave
+from served import DETAILS, Served, leave
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 FEATURES = "id => window.terragripMap.map.getSource(id).serialize().data.features"
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from served import NEEDS, Served
+from served import DETAILS, Served
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 
 def test_the_hint_covers_no_axis(page: Any, served: Served) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -10,11 +10,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from served import NEEDS, Served, axe_violations, leave
+from served import DETAILS, Served, axe_violations, leave
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 RANGE = "() => window.terragripDrive.charts.range"
 WHOLE = "() => window.terragripDrive.charts.whole"

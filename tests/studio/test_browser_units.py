@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from live_service import listened_to
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 
 def choose(page: Any, **units: str) -> None:

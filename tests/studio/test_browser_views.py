@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from served import NEEDS, Served, leave
+from served import DETAILS, Served, leave
 from terragrip.estimation import Estimates
 from terragrip.ground.events import events
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 PLACE = """() => {
   const { map } = window.terragripMap;

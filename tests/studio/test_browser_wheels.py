@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from served import NEEDS, Served
+from served import DETAILS, Served
 from terragrip.estimation import Estimates
 
 pytest.importorskip("playwright.sync_api", reason="SKIPPED LOUDLY: the browser tests need playwright")
-pytestmark = NEEDS
+pytestmark = DETAILS
 
 GERMAN = {"fl": "vl", "fr": "vr", "rl": "hl", "rr": "hr"}
 
