@@ -13,6 +13,7 @@ from terragrip.formats import read
 from terragrip.formats.candidates import candidates_of, columns_of
 from terragrip.formats.channel_proposal import Proposal
 from terragrip.formats.recognition import propose
+from terragrip.formats.time_column import find_time
 from terragrip.formats.vocabulary import GENERAL
 from terragrip.vehicle import Vehicle
 
@@ -243,3 +244,96 @@ def test_both_velocities_of_a_message_that_are_great_are_over_ground() -> None:
     assert found.doubt
     along = {name: SPEED if name.endswith("x") else 0.01 * SPEED for name in columns}
     assert _propose(along)["ground_speed"].columns == ("/fix_velocity.twist.linear.x",)
+
+
+def _car(radius: float) -> Vehicle:
+    axle = {"mass": 500.0, "wheel": {"radius": radius, "inertia": 1.0}}
+    axles = {"front": {**axle, "wheels": ["fl", "fr"]}, "rear": {**axle, "wheels": ["rl", "rr"]}}
+    return Vehicle.model_validate(
+        {"mass": 1000.0, "wheelbase": 2.5, "center_of_gravity_height": 0.5, "axles": axles}
+    )
+
+
+def _of_car(columns: dict[str, np.ndarray], vehicle: Vehicle | None = None) -> dict[str, Proposal]:
+    return propose(columns, (), {}, dict.fromkeys(columns, TIME), vehicle=vehicle)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("km/h", 3.6 * 0.3), ("rad/s", 1.0)])
+def test_rim_speeds_in_kmh_by_our_own_names_are_asked_for_by_a_cars_radius(unit: str, factor: float) -> None:
+    """By .3 m rad/s are only 8 % off: 'in no other unit near it' was said of a car's wheels in km/h, and slip was .08 too high."""
+    names = [f"wheel_speed_{wheel}" for wheel in ("fl", "fr", "rl", "rr")]
+    columns = dict.fromkeys(names, factor * SPEED / 0.3) | {"gps_speed_mps": SPEED}
+    for name in names:
+        one = _of_car(columns, _car(0.3))[name]
+        assert ("1.00 times (in km/h) or 1.08 times (in rad/s)" in one.doubt) == (unit == "km/h")
+        assert bool(one.doubt) == (unit == "km/h")
+        assert one.unit == "rad/s"
+
+
+def test_gyros_without_a_unit_have_that_of_their_own_sensor() -> None:
+    """Beside a chassis' yaw rate in deg/s gyros in rad/s were proposed in deg/s, surely."""
+    rng = np.random.default_rng(1)
+    gyros = {f"gyro_{axis}": 0.05 * rng.standard_normal(len(TIME)) for axis in "xy"}
+    heading = np.degrees(np.cumsum(TURN) * 0.05)
+    columns = {"heading": heading, "yaw_rate": np.degrees(TURN), **gyros, "gyro_z": TURN}
+    result = _propose(columns)
+    assert {axis: result[f"angular_velocity_{axis}"].unit for axis in "xyz"} == {
+        "x": "rad/s",
+        "y": "rad/s",
+        "z": "deg/s",
+    }
+    del columns["gyro_z"]
+    assert _propose(columns)["angular_velocity_x"].unit == "deg/s"  # nothing else shows it
+
+
+def test_accelerations_in_capital_g_are_in_g() -> None:
+    """They were in doubt: 'stated in G, but the three sum up to gravity, in g'."""
+    rng = np.random.default_rng(2)
+    sizes = {"Long": 0.1 * np.sin(TIME), "Lat": SPEED * TURN / 9.8, "Vert": np.ones(len(TIME))}
+    columns = {f"G Force {n} [G]": x + 0.01 * rng.standard_normal(len(TIME)) for n, x in sizes.items()}
+    bare = {name.partition(" [")[0]: values for name, values in columns.items()}
+    units = dict.fromkeys(bare, "G")
+    result = propose(bare, (), units, dict.fromkeys(bare, TIME))
+    assert [result[f"acceleration_{axis}"].doubt for axis in "xyz"] == ["", "", ""]
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_ground_speed_that_is_made_of_the_wheels_is_not_taken_for_one(known: bool) -> None:
+    """MoTeC's channel 'Ground Speed' is the mean of wheels: it came before the receiver's, surely, and slip was 0 by construction."""
+    rng = np.random.default_rng(3)
+    rims = {
+        f"Wheel Speed {wheel} [m/s]": SPEED * (1.03 + 0.004 * rng.standard_normal(len(TIME)))
+        for wheel in ("FL", "FR", "RL", "RR")
+    }
+    front = list(rims.values())[:2]
+    columns = {**rims, "Ground Speed [m/s]": np.mean(front, axis=0)}
+    vehicle = _car(0.3) if known else None
+    assert _of_car(columns, vehicle)["ground_speed"].doubt == "is made of the wheels' speeds: odometry?"
+    gps = SPEED + 0.02 * rng.standard_normal(len(TIME))
+    result = _of_car({**columns, "GPS Speed [m/s]": gps}, vehicle)["ground_speed"]
+    assert (result.columns, result.doubt) == (("GPS Speed [m/s]",), "")
+    place = {"latitude": 45.0 + np.cumsum(SPEED) * 0.05 / 111_132.0, "longitude": 11.0 + 1e-6 * TIME}
+    by_place = _of_car(columns | place, vehicle)["ground_speed"]
+    assert by_place.columns == (("latitude", "longitude") if known else ("Ground Speed [m/s]",))
+
+
+def test_a_time_in_milliseconds_comes_before_a_receivers_that_repeats() -> None:
+    """VESC Tool writes ms_today, and the receiver's time of the last fix: that one was proposed, and 'estimate' refused it."""
+    whole = np.floor(TIME)
+    columns = {"ms_today": 36e6 + 1000 * TIME, "erpm": 100 * SPEED, "gnss_posTime": 36e6 + 1000 * whole}
+    found = find_time(columns, (), {})
+    assert found is not None
+    assert (found.name, found.unit, found.doubt) == ("ms_today", "ms", "")
+    us_left = 50 + 10 * np.sin(TIME)  # an ultrasonic sensor
+    assert find_time({"us_left": us_left}, (), {}) is None
+
+
+def test_signals_of_a_bus_are_proposed_in_the_order_of_the_profile_of_tractors() -> None:
+    """Which message came first in the log decided: of one drive the 1 Hz receiver's speed, or the radar's."""
+    speeds = {"NavigationBasedVehicleSpeed": 3.6 * SPEED, "GroundBasedMachineSpeed": SPEED}
+    speeds |= {"WheelBasedVehicleSpeed": 3.7 * SPEED, "WheelBasedMachineSpeed": 1.03 * SPEED}
+    units = {name: "km/h" if "Vehicle" in name else "m/s" for name in speeds}
+    for columns in (speeds, dict(reversed(speeds.items()))):
+        result = propose(columns, (), units, dict.fromkeys(columns, TIME))
+        assert result["ground_speed"].columns == ("GroundBasedMachineSpeed",)
+        assert result["wheel_based_speed"].columns == ("WheelBasedMachineSpeed",)

@@ -11,8 +11,10 @@ import numpy as np
 from terragrip.formats.candidates import Column, candidates_of
 from terragrip.formats.evidence import Evidence, Finding, Series, nearest_unit, sizes
 from terragrip.formats.judgement import E7, Guess
+from terragrip.formats.rim_units import own_name
 from terragrip.formats.rims import Ranked, Rims, Way, surest
 from terragrip.recording.checks import PLACES
+from terragrip.recording.pace import is_odometry
 from terragrip.units import factor_to
 from terragrip.vehicle import Vehicle
 
@@ -57,6 +59,7 @@ class Agreement:
         """Odometry's speed that does not follow from the wheel speeds may be smoothed, fused or a camera's, its rate of turn that does is
         no gyroscope's: a doubt."""
         rims = [g.column.column for c in ranked if c.startswith("wheel_speed_") and (g := surest(ranked, c))]
+        self._ground_of_wheels(ranked)
         for k, guess in enumerate(ranked.get("wheel_based_speed", ())):
             if len(rims) < 2 or not guess.column.name.has("odometry") or guess.column.name.has("wheel"):
                 continue
@@ -73,6 +76,33 @@ class Agreement:
             if rest is not None and rest < _NOT_OF_WHEELS:
                 doubt = "follows from the wheel speeds: no gyroscope?"
                 ranked["angular_velocity_z"][k] = replace(guess, confidence=0.4, doubt=doubt)
+
+    def _ground_of_wheels(self, ranked: Ranked) -> None:
+        """A ground speed that is made of the driven wheels' is left out for positions or another one, else in doubt: MoTeC's is."""
+        driven = self._driven_rims(ranked)
+        made = [g for g in ranked.get("ground_speed", ()) if self._is_odometry(g, driven)]
+        if not made:
+            return
+        others = [g for g in ranked["ground_speed"] if g not in made]
+        if self._vehicle is None or not (others or surest(ranked, "latitude")):  # those wheels may be free
+            doubt = "is made of the wheels' speeds: odometry?"
+            others += [replace(g, confidence=0.4, doubt=doubt) for g in made]
+        ranked["ground_speed"] = others
+
+    def _is_odometry(self, guess: Guess, driven: list[str]) -> bool:
+        series = self._evidence.series(guess.column.column)
+        if not driven or series is None:
+            return False
+        return is_odometry(*series, np.array([self._evidence.at(rim, series[0]) for rim in driven]))
+
+    def _driven_rims(self, ranked: Ranked) -> list[str]:
+        """The columns of the driven wheels' speeds; none where one of the vehicle's is not in the log."""
+        best = {
+            c.removeprefix("wheel_speed_"): surest(ranked, c) for c in ranked if c.startswith("wheel_speed_")
+        }
+        rims = {own_name(self._vehicle, w): g.column.column for w, g in best.items() if g is not None}
+        driven = list(rims) if self._vehicle is None else self._vehicle.driven_wheels
+        return [rims[wheel] for wheel in driven] if set(driven) <= rims.keys() else []
 
     def _two_scales(self, ranked: Ranked) -> None:
         """Of two speeds over ground that go together and are of other sizes one is of another scale; nothing shows which."""
@@ -282,20 +312,24 @@ class Agreement:
             judged.append(guess)
         ranked["angular_velocity_z"] = [g for g in judged if g.confidence > 0.35]
         best = surest(ranked, "angular_velocity_z")
-        if best is None or best.doubt or best.unit_doubt or best.unit is None:
+        if best is None:
             return
+        own = {
+            _sensor_of(g): g for g in judged
+        }  # of one sensor: a yaw rate in deg/s may stand beside gyros in rad/s
         for channel in ("angular_velocity_x", "angular_velocity_y"):
             ranked[channel] = [
-                replace(
-                    g,
-                    unit=best.unit,
-                    unit_doubt="",
-                    evidence=(*g.evidence, f"in the unit of {best.column.column}"),
-                )
-                if g.column.unit is None and g.unit_doubt.startswith("no unit")
-                else g
-                for g in ranked.get(channel, [])
+                self._in_unit_of(own.get(_sensor_of(g), best), g) for g in ranked.get(channel, [])
             ]
+
+    def _in_unit_of(self, known: Guess, guess: Guess) -> Guess:
+        """A rate that states no unit, in that of the rate of turn beside it, where there is no doubt about that."""
+        if known.doubt or known.unit_doubt or known.unit is None:
+            return guess
+        if guess.column.unit is not None or not guess.unit_doubt.startswith("no unit"):
+            return guess
+        evidence = (*guess.evidence, f"in the unit of {known.column.column}")
+        return replace(guess, unit=known.unit, unit_doubt="", evidence=evidence)
 
     def _at_speed(self, guess: Guess, ground: tuple[str, float] | None) -> Finding | None:
         """A rate of turn without a unit beside a speed: in rad/s it must not ask for more sideways than a vehicle can."""
@@ -351,3 +385,8 @@ class Agreement:
                     )
                 result.append((f"{lateral.column.column} over {ground[0]}", (series[0], sideways)))
         return result
+
+
+def _sensor_of(guess: Guess) -> str:
+    """A column's name without its axis: gyro_x and gyro_z are of one sensor."""
+    return " ".join(word for word in guess.column.name.words if word != guess.column.name.axis)

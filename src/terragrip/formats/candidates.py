@@ -154,7 +154,10 @@ def _by_name(column: Column) -> list[Candidate]:
         return [Candidate(last, 1.0, "Terragrip's own name")]
     standard = _on_the_bus().get(_written_out(last))
     if standard is not None:
-        return [Candidate(standard, 0.95, ON_THE_BUS)]
+        channel, place = standard
+        return [
+            Candidate(channel, 0.95 - 0.005 * place, ON_THE_BUS)
+        ]  # in the order in which that profile uses them
     if _BRAKE.search("".join(column.name.words)) and not column.name.has("command"):
         return [Candidate("brake", 0.7, "a brake's switch or pedal")]
     of_gearbox = not _GEARBOX.isdisjoint(column.name.words) and not column.name.has("command", "statistic")
@@ -331,10 +334,14 @@ def _tractor() -> Profile:
 
 
 @cache
-def _on_the_bus() -> dict[str, str]:
-    """Channels by the names of standard signals, as the shipped profile of tractors knows them."""
+def _on_the_bus() -> dict[str, tuple[str, int]]:
+    """Channels, and the place among their signals, by the names of standard signals, as the shipped profile of tractors knows them."""
     channels = _tractor().channels.items()
-    return {_written_out(name): channel for channel, source in channels for name in source.candidates}
+    return {
+        _written_out(name): (channel, place)
+        for channel, source in channels
+        for place, name in enumerate(source.candidates)
+    }
 
 
 def _written_out(name: str) -> str:

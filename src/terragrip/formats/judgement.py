@@ -167,7 +167,9 @@ def _same(unit: str, other: str) -> bool:
     try:
         return 0.88 < factor_to(unit, other) < 1.14
     except UnitError:
-        return kind_of(unit) == kind_of(other) == "acceleration" and unit == other
+        if not kind_of(unit) == kind_of(other) == "acceleration":
+            return False
+        return 0.88 < factor_to(unit, "m/s^2") / factor_to(other, "m/s^2") < 1.14  # G is g
 
 
 def _too_large(guess: Guess, size: float, target: str) -> bool:

@@ -80,10 +80,11 @@ class RimUnit:
     def judge(self, guess: Guess, radius: float) -> Guess:
         """The guess with this unit: surer where no other is possible, with a question mark where one is."""
         is_own = guess.column.column == guess.channel
-        if is_own and "rad/s" in self.possible and not self.contradicts_own:  # by our own name it is rad/s
-            own = RimUnit(self.ground, {"rad/s": self.possible["rad/s"]})
-            return guess.with_finding(Finding(True, own.sentence(radius), "rad/s"))
         sentence = self.sentence(radius)
+        if is_own and "rad/s" in self.possible and not self.contradicts_own:  # by our own name it is rad/s
+            if self.unit == "rad/s":
+                return guess.with_finding(Finding(True, sentence, "rad/s"))
+            return replace(guess, confidence=0.7 * guess.confidence, unit="rad/s", unit_doubt=f"{sentence}?")
         if self.possible and not self.is_sure:
             return replace(
                 guess, confidence=0.7 * guess.confidence, unit=self.unit, unit_doubt=f"{sentence}?"

@@ -83,7 +83,11 @@ def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabula
         own = stated if stated is not None and kind_of(stated) == "time" else None
         own, doubt = _unit(known, own)
         return 6.0 if _forward(known) > 0.9 and len(known) == len(values) else 3.0, own, doubt
-    units = (stated, name.unit, _unit_word(name.words, vocabulary), *name.words[:1] * (name.words in _ALONE))
+    first = name.words[:1]
+    alone = first in _ALONE and (
+        first == name.words or _forward(known) > 0.9
+    )  # ms_today; not us_left, an ultrasonic one
+    units = (stated, name.unit, _unit_word(name.words, vocabulary), *first * alone)
     unit = next((u for u in units if u and kind_of(u) == "time"), None)
     if (
         not (name.has("time") or words & {"t", "ts"} or unit)

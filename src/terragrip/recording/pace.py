@@ -114,24 +114,29 @@ def odometry_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     known = [c for c in columns if c is not None]
     if ground is None or not known or len(known) < len(columns):
         return []
-    rows = np.flatnonzero(np.isfinite(ground) & np.isfinite(known).all(axis=0))
-    rows = rows[:: max(1, len(rows) // _ENOUGH)]
-    speed, turning = ground[rows], np.array(known)[:, rows].T
-    moving = np.abs(speed) > _DRIVEN * float(np.max(np.abs(speed), initial=0.0))
-    if moving.sum() < 20 * len(known) or not np.ptp(speed[moving]):
-        return []
-    speed, turning = speed[moving], turning[moving]
-    size = float(np.sqrt(np.mean(speed**2)))
-    rest = speed - turning @ np.linalg.lstsq(turning, speed, rcond=None)[0]
-    if float(np.sqrt(np.mean(rest**2))) > _COPY * size:
-        return []
-    # last, since it needs a fifth of an estimate's time
-    if (white_noise(*measured_part(recording.time, ground)) or 0.0) < _SHARED * size:
+    if not is_odometry(recording.time, ground, np.array(known)):
         return []
     return [
         "ground_speed is made of the wheels' speeds (odometry): slip from it is not a measurement. Give a speed over "
         "ground: from a receiver, a radar, or positions ('derivative_of')."
     ]
+
+
+def is_odometry(time: Floats, ground: Floats, wheels: Floats) -> bool:
+    """Whether a ground speed (n,) at ``time`` (n,) [s] is a sum of ``wheels`` (wheels, n), each times a number, its noise included."""
+    rows = np.flatnonzero(np.isfinite(ground) & np.isfinite(wheels).all(axis=0))
+    rows = rows[:: max(1, len(rows) // _ENOUGH)]
+    speed, turning = ground[rows], wheels[:, rows].T
+    moving = np.abs(speed) > _DRIVEN * float(np.max(np.abs(speed), initial=0.0))
+    if moving.sum() < 20 * len(wheels) or not np.ptp(speed[moving]):
+        return False
+    speed, turning = speed[moving], turning[moving]
+    size = float(np.sqrt(np.mean(speed**2)))
+    rest = speed - turning @ np.linalg.lstsq(turning, speed, rcond=None)[0]
+    if float(np.sqrt(np.mean(rest**2))) > _COPY * size:
+        return False
+    # last, since it needs a fifth of an estimate's time
+    return (white_noise(*measured_part(time, ground)) or 0.0) >= _SHARED * size
 
 
 def _rims(recording: Recording, vehicle: Vehicle) -> list[tuple[float, Floats]]:
