@@ -19,7 +19,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.slip_only import slip_reference_in
 from terragrip.estimation.turning import turn_in
 from terragrip.recording import LogBlocks, Recording, survey_of
-from terragrip.recording.alignment import aligned
+from terragrip.recording.alignment import recording_of
 from terragrip.recording.counted import refuse_counted
 from terragrip.recording.interpolated import lines_in, without_lines
 from terragrip.vehicle import Vehicle, require_vehicle
@@ -75,7 +75,7 @@ def estimate(
     ------
     InputError: the recording or the vehicle is unusable, there is no such method, or `algebraic` is used with ``smooth``.
     """
-    log = recording if isinstance(recording, Recording) else next(aligned([Recording.from_frame(recording)]))
+    log = recording_of(recording)
     options = RunOptions(method, smooth, sensors, held, gap, standstill_speed)
     (result,) = estimated(LogBlocks.of(log), vehicle, options, progress=progress)
     return result

@@ -13,6 +13,7 @@ from terragrip.estimation.forward import finished, prepared, table_of
 from terragrip.estimation.methods import DEFAULT
 from terragrip.estimation.provenance import notes_of
 from terragrip.recording import Recording
+from terragrip.recording.alignment import recording_of
 
 if TYPE_CHECKING:
     from terragrip.estimation.estimates import Estimates
@@ -35,7 +36,7 @@ def estimate_with_channel_nis(
     the channel was not measured: a wheel speed held between its updates and a reckoned ground speed are no measurements. Of logs without
     torque, a rim's is given the ground speed of the same row. Raises InputError as `estimate` does.
     """
-    log = recording if isinstance(recording, Recording) else Recording.from_frame(recording)
+    log = recording_of(recording)
     estimator = TractionEstimator.for_recording(log, vehicle, method, sensors=sensors)
     places = _places(estimator.engine.slots_in)
     estimator.engine.slots_out.update(places)

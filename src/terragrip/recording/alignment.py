@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from terragrip.recording.survey import BEGINNING, first_speeds
 from terragrip.recording.table import Recording
 
 _LONGEST = 1.0  # s, or three samples, across which nothing is interpolated
+
+
+def recording_of(given: Recording | Any) -> Recording:
+    """A recording as it is; of a table that :meth:`Recording.from_frame` accepts, the one that a file of it would give: aligned.
+
+    Raises InputError as `Recording.from_frame` does.
+    """
+    return given if isinstance(given, Recording) else next(aligned([Recording.from_frame(given)]))
 
 
 def aligned(blocks: Iterable[Recording]) -> Iterator[Recording]:

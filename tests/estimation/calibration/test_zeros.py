@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import sem
 
+from terragrip import read
 from terragrip.errors import InputError
 from terragrip.estimation import calibrate
 from terragrip.estimation.calibration.zeros import spell_mean
@@ -224,12 +226,25 @@ def test_a_bias_beyond_its_prior_is_not_shrunk_away(drive: Make, vehicle: Vehicl
     assert bias.value == pytest.approx(0.8, abs=0.05)
 
 
+def test_a_table_is_calibrated_as_a_file_of_it_is(drive: Make, vehicle: Vehicle, tmp_path: Path) -> None:
+    table = drive(40).to_pandas()
+    table.to_parquet(tmp_path / "log.parquet")
+
+    def values(given: object) -> list[tuple[str, str | None, float, float]]:
+        return [(q.key, q.wheel, q.value, q.std) for q in calibrate(given, vehicle).quantities]
+
+    of_file = values(read(tmp_path / "log.parquet"))
+    assert of_file
+    for same in (table, [table], dict(table.items()), iter([table])):
+        assert values(same) == of_file
+
+
 def test_nothing_to_calibrate_from_and_foreign_logs_are_refused(drive: Make, vehicle: Vehicle) -> None:
     with pytest.raises(InputError, match="no recording"):
         calibrate([], vehicle)
     log = drive(20)
-    for wrong in (log.to_pandas(), None):
-        with pytest.raises(InputError, match=f"{type(wrong).__name__} is no recording; give what tg.read"):
+    for wrong in (None, [log, None]):
+        with pytest.raises(InputError, match=r"NoneType is not a table; give what tg.read"):
             calibrate(wrong, vehicle)
     channels = {name.replace("_fl", "_xx"): values for name, values in log.channels.items()}
     with pytest.raises(InputError, match="no wheel xx"):

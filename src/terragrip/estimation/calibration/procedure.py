@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from terragrip.estimation.rims import speeds_alone
 from terragrip.estimation.zero_slip import Span
 from terragrip.physics.loads import GRAVITY
 from terragrip.recording import Recording, sensor_noise, unit_warnings, without_held
+from terragrip.recording.alignment import recording_of
 from terragrip.recording.brake import unbraked
 from terragrip.recording.cycles import in_cycles
 from terragrip.vehicle import Vehicle, require_vehicle
@@ -55,7 +56,7 @@ def _refuse_other_load(log: Recording, vehicle: Vehicle) -> None:
 
 
 def calibrate(
-    recordings: Recording | Sequence[Recording],
+    recordings: Recording | Any | Sequence[Recording | Any],
     vehicle: Vehicle,
     *,
     light: Sequence[Span | None] | None = None,
@@ -70,7 +71,8 @@ def calibrate(
 
     Parameters
     ----------
-    recordings: logs of one vehicle in one state, read by :func:`terragrip.read`. A ``soil`` label sharpens the gains.
+    recordings: one log, or a list of logs of one vehicle in one state, each a Recording or a table that :meth:`Recording.from_frame`
+        accepts. A ``soil`` label sharpens the gains.
     vehicle: from its file.
     light: of each log without torque the span [s] driven without load, if known (None: unknown).
 
@@ -78,14 +80,8 @@ def calibrate(
     ------
     InputError: there is no log, or one does not fit the vehicle.
     """
-    given: Any = recordings
-    alone = isinstance(given, Recording) or hasattr(given, "columns") or not hasattr(given, "__iter__")
-    logs: list[Any] = [given] if alone else list(given)
-    if strange := [one for one in logs if not isinstance(one, Recording)]:
-        raise InputError(
-            f"{type(strange[0]).__name__} is no recording",
-            hint="give what tg.read(path) returns, or a list of them",
-        )
+    several = isinstance(recordings, list | tuple | Iterator)
+    logs = [recording_of(one) for one in (recordings if several else [recordings])]
     require_vehicle(vehicle)
     if not logs:
         raise InputError("there is no recording to calibrate from", hint="give at least one log")
