@@ -131,3 +131,29 @@ def test_a_soil_without_a_zero_pull_pass_says_nothing(drive: Make, vehicle: Vehi
     alone, beside = rolling(logs), rolling([*logs, worked])
     np.testing.assert_allclose(beside.radius, alone.radius, rtol=1e-9)
     np.testing.assert_allclose(beside.std, alone.std, rtol=1e-9)
+
+
+def test_unequal_radii_leave_what_is_known_of_the_machine(drive: Make, vehicle: Vehicle) -> None:
+    unequal = dict(zip(WHEELS, (0.94, 1.0, 1.0, 1.03), strict=True))
+
+    def worn(log: Recording) -> Recording:
+        """A wheel of k times the radius turns 1/k times as fast, by k times the torque."""
+        speeds = {f"wheel_speed_{w}": log[f"wheel_speed_{w}"] / k for w, k in unequal.items()}
+        return log.with_channels(
+            **speeds, **{f"drive_torque_{w}": log[f"drive_torque_{w}"] * k for w, k in unequal.items()}
+        )
+
+    data = vehicle.to_dict()
+    vehicle = Vehicle.from_dict({**data, "uncertainty": {**data["uncertainty"], "wheel_radius": 0.05}})
+    for seed in range(4):
+        logs = [
+            free_pass(drive, 0.2, seed, noise=1.0),
+            drive(240, slip=(0.0, 0.25), seed=seed, noise=1.0, patches=0.05, standing=10),
+        ]
+        logs = [log.with_channels(angular_velocity_z=np.zeros(len(log))) for log in logs]
+        equal, result = (calibrate(these, vehicle) for these in (logs, [worn(log) for log in logs]))
+        known, own = ([c[f"wheel_radius {wheel}"] for wheel in WHEELS] for c in (equal, result))
+        common = [
+            q.value / k / before.value for q, k, before in zip(own, unequal.values(), known, strict=True)
+        ]
+        assert np.mean(common) == pytest.approx(1.0, abs=0.3 * known[0].std / known[0].value)

@@ -207,6 +207,7 @@ def _fit(
     count = len(shared)
     rim = np.where(used, windows.wheel_speed * vehicle.wheel_radius, 1.0)
     ratio = np.log(np.where(used, windows.hub_speed, 1.0) / rim)
+    ratio -= _own(ratio, used, group)
     pull = np.where(used, adhesion, 0.0)
     (steep, steep_spread), (_, level_spread) = _STEEPNESS, _LEVEL
     level_mean = np.log(np.maximum(_LEVEL[0], 1.2 * most))
@@ -257,6 +258,13 @@ def _fit(
     )
     held = min(effective_blocks(normal, rooted[informed], block[informed], k) for k in range(count))
     return np.exp(values[group]), variance[group], np.exp(values[count : count + soils]), held
+
+
+def _own(ratio: Floats, used: Bools, group: Ints) -> Floats:
+    """What the ratios (n, w) of each wheel differ by, over the windows, from the mean of its ``group`` (w,): a radius of its own,
+    which is no outlier, (w,)."""
+    median = np.nanmedian(np.where(used, ratio, np.nan), axis=0)
+    return median - np.log(np.bincount(group, np.exp(median)) / np.bincount(group))[group]
 
 
 def _slip_at(pull: Floats, steepness: Floats, level: Floats) -> tuple[Floats, Floats]:
