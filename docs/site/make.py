@@ -71,6 +71,7 @@ CONTENTS: dict[str, list[str]] = {
         "families",
         "families-history",
         "ground-history",
+        "vehicle-history",
         "warning",
         "real-logs",
         "benchmarks",
