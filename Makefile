@@ -146,7 +146,7 @@ $(VENV)/made:
 $(VENV)/runtime: $(VENV)/made requirements.lock
 	@echo "Installing the packages of requirements.lock"
 	@$(PIP) install -qq --no-compile -r requirements.lock
-	@$(BIN)/python -m compileall -qq -j 2 -x '/tests?/' $(VENV)/lib || true
+	@$(BIN)/python -W ignore -m compileall -qq -j 2 -x '/tests?/' $(VENV)/lib || true
 	@touch $@
 
 # Beside the package, which the compiler is at for most of the time: both have what is in runtime already and add what the other does not.
