@@ -72,6 +72,7 @@ CONTENTS: dict[str, list[str]] = {
         "families-history",
         "ground-history",
         "vehicle-history",
+        "maps-history",
         "warning",
         "real-logs",
         "benchmarks",
