@@ -73,6 +73,7 @@ CONTENTS: dict[str, list[str]] = {
         "ground-history",
         "vehicle-history",
         "maps-history",
+        "advice-history",
         "warning",
         "real-logs",
         "benchmarks",

@@ -10,7 +10,7 @@ known, by what form is not. c r_0 is the adhesion that a wheel needs before it s
 alike for a whole drive: a wrong radius, a slow error of the ground speed. Each curve is fitted to bins drawn anew by stretches of way,
 to constants (torque scale, drawbar and slope) drawn by their stated spread, and to a prior drawn by its spread (randomised maximum a
 posteriori; Bardsley et al. 2014): with much data the curves agree, with little they spread as far as soils do.
-Why these: docs/advice.md, "What the advice does not know".
+Why these: docs/advice-history.md.
 """
 
 from __future__ import annotations
