@@ -53,6 +53,21 @@ def test_a_ratio_of_wheel_to_ground_speed_names_the_unit_at_any_usual_slip(
     assert f"is {ratio / (1 - slip):.3g} times the ground speed" in note
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_vehicle_that_digs_in_after_a_short_drive_has_no_other_unit(vehicle: Vehicle, seed: int) -> None:
+    """30 m at 1 m/s, then an hour in which the wheels spin and the receiver shows its noise."""
+    time = np.arange(0.0, 3630.0, 0.1)
+    noise = 0.05 * np.random.default_rng(seed).standard_normal(len(time))
+    speed = np.where(time < 30, 1.0, 0.02) + noise
+    turning = {w: np.full(len(time), 1.05 / RADIUS) for w in ("fl", "fr", "rl", "rr")}
+    note = said(vehicle, time, ground_speed=speed, **{f"wheel_speed_{w}": v for w, v in turning.items()})
+    assert "times the ground speed" not in note
+    faster = {f"wheel_speed_{w}": 30 / np.pi * v for w, v in turning.items()}
+    assert "may be in rpm" in said(
+        vehicle, time, ground_speed=np.where(time < 2000, 1.0, 0.02) + noise, **faster
+    )
+
+
 @pytest.mark.parametrize("step", [0.1, 1.0, 5.0])
 def test_a_time_of_day_written_as_hhmmss_is_named(vehicle: Vehicle, step: float) -> None:
     """As receivers write it: 10:59:59 is 105959, and 11:00:00 is 110000. Seconds of the day are left alone."""

@@ -152,7 +152,10 @@ def drive_train_warnings(recording: Recording) -> list[str]:
 
 
 def ratio_of(recording: Recording, other: Floats) -> float | None:
-    """Median of |other| / |ground speed| (n,) while both move; None without enough motion, or a ground speed."""
+    """Median of |other| / |ground speed| (n,) while both move; None without enough motion, or a ground speed.
+
+    Beyond what slips reach rows count by the square of their speed: a vehicle that digs in for most of a log drove before.
+    """
     speed = recording.channels.get("ground_speed")
     pairs = None if speed is None else _pairs(recording.time, speed, other)
     if pairs is None:
@@ -161,7 +164,16 @@ def ratio_of(recording: Recording, other: Floats) -> float | None:
     moving = (
         (ground > 0.3 * quantile(ground, 0.95)) & (rim > 0.3 * quantile(rim, 0.95)) & (ground > 0) & (rim > 0)
     )
-    return median(rim[moving] / ground[moving]) if moving.sum() >= 10 else None
+    if moving.sum() < 10:
+        return None
+    ratio = median(rim[moving] / ground[moving])
+    if ratio <= RATIOS[1]:
+        return ratio
+    turning = ground > 0
+    ratios = rim[turning] / ground[turning]
+    order = np.argsort(ratios)
+    counted = np.cumsum(ground[turning][order] ** 2)
+    return float(ratios[order][np.searchsorted(counted, counted[-1] / 2)])
 
 
 def _pairs(time: Floats, speed: Floats, turning: Floats) -> tuple[Floats, Floats] | None:
