@@ -81,6 +81,7 @@ CONTENTS: dict[str, list[str]] = {
     "Inside": [
         "architecture",
         "architecture-history",
+        "live-history",
         "kernel",
         "tuned-numbers",
         "ablation",
