@@ -82,6 +82,30 @@ def test_candump_as_printed_and_other_tables(tmp_path: Path) -> None:
         assert np.nanmax(columns["GroundBasedMachineSpeed"]) == 2.0, name
 
 
+def test_tables_of_frames_as_other_loggers_write_them(tmp_path: Path) -> None:
+    """SavvyCAN, CL2000, Kvaser and Vehicle Spy: they were read as tables of numbers, and refused: 'log the wheels too'."""
+    moves = [(0.5, 0x0CFE48F0, "E8 03 00 00 00 00 FF FD"), (1.0, 0x0CFE4980, "D0 07 00 00 00 00 FF FD")]
+    frames = [(time + n, number, bytes.fromhex(data)) for n in range(3) for time, number, data in moves]
+    cells = [(time, number, [f"{byte:02X}" for byte in data]) for time, number, data in frames]
+    texts = {
+        "savvycan.csv": "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
+        + "".join(f"{1e6 * t + 5e8:.0f},{i:08X},true,Rx,0,8,{','.join(d)},\n" for t, i, d in cells),
+        "cl2000.txt": "# Logger type: CANLogger2000\n# Time format: 6\nTimestamp;Type;ID;Data\n"
+        + "".join(f"20240914T10000{t:.3f};1;{i:x};{''.join(d)}\n" for t, i, d in cells),
+        "kvaser.csv": "Time,Channel,ID,Flags,DLC,Data0,Data1,Data2,Data3,Data4,Data5,Data6,Data7,Counter\n"
+        + "".join(f"{t:.6f},0,{i},X,8,{','.join(map(str, d))},1\n" for t, i, d in frames),
+        "spy.csv": "Vehicle Spy 3 Log\nsaved,today\nLine,Abs Time(Sec),Tx,Network,Arb ID,Remote,Xtd,B1,B2,B3,B4,B5,B6,B7,B8\n"
+        + "".join(f"1,{t:.6f},F,HS CAN,{i:08X},F,T,{','.join(d)}\n" for t, i, d in cells),
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        table = read_table(tmp_path / name)
+        time = table.columns["time"]
+        assert time[-1] - time[0] == pytest.approx(2.5), name
+        assert np.nanmax(table.columns["WheelBasedMachineSpeed"]) == 1.0, name
+        assert np.nanmax(table.columns["GroundBasedMachineSpeed"]) == 2.0, name
+
+
 def decoded(
     frames: list[tuple[float, int, bytes]], databases: tuple[Path, ...] = ()
 ) -> dict[str, np.ndarray]:

@@ -696,3 +696,25 @@ def test_a_line_of_types_under_the_names_is_named(tmp_path: Path) -> None:
         InputError, match="'f8' is not a number; delete lines of types, units or sources under the names"
     ):
         read(path)
+
+
+@pytest.mark.parametrize("units", ["", "s,km/h,1/min,1/min\n"])
+def test_a_header_that_stands_again_between_the_rows_is_left_out(tmp_path: Path, units: str) -> None:
+    """Loggers write it whenever they begin anew (Torque does); every column was then one of texts, or the log refused."""
+    header = "time,v_gps,n_l,n_r\n" + units
+    rows = [f"{0.1 * k:.1f},{3 + k % 7},{20 + k % 5},{21 + k % 5}\n" for k in range(60)]
+    path = put(
+        tmp_path, header + "".join(rows[:20]) + header + "".join(rows[20:40]) + header + "".join(rows[40:])
+    )
+    table = read_table(path).columns
+    assert len(table["n_l"]) == 60
+    assert table["v_gps"].dtype.kind in "fi"
+    assert [w for w in inspect(path).warnings if "stands 2 times more between the rows" in w]
+    assert not [w for w in inspect(put(tmp_path, header + "".join(rows))).warnings if "between the rows" in w]
+
+
+def test_marks_of_missing_values_may_have_a_blank_before_them(tmp_path: Path) -> None:
+    """Of rows as '1, -, 2' the column was one of texts."""
+    rows = "".join(f"{0.1 * k:.1f}, {'-' if k < 3 else k}, {'NaN' if k == 5 else 2}\n" for k in range(20))
+    table = read_table(put(tmp_path, "time, n_l, n_r\n" + rows)).columns
+    assert (np.isnan(table["n_l"]).sum(), np.isnan(table["n_r"]).sum()) == (3, 1)

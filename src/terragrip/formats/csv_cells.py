@@ -31,7 +31,8 @@ def body_of(
     data: bytes, dialect: Dialect, start: int, *, more: bool = False
 ) -> tuple[bytes | memoryview, Dialect, list[str]]:
     """The rows from ``start`` on, how they are then written, and notes: a last line that was cut off while writing is left out, and so
-    are empty lines of a spreadsheet at the end, and remarks between the rows (``# Lap 1 ...``); runs of blanks become tabs.
+    are empty lines of a spreadsheet at the end, remarks between the rows (``# Lap 1 ...``), and lines that repeat the header's; runs of
+    blanks become tabs.
 
     ``more``: there are rows before these.
     """
@@ -48,6 +49,18 @@ def body_of(
         body = body[: max(ends - start, 0)]
     if data.startswith(b"# ", start) or data.find(b"\n# ", start) >= 0:
         body = _REMARKS.sub(b"", bytes(body))
+    again = 0
+    for line in (line.encode() for line in dialect.header):
+        if data.startswith(line, start) or data.find(b"\n" + line, start) >= 0:
+            body, count = re.subn(
+                rb"^" + re.escape(line) + rb"[ \t\r]*(?:\n|\Z)", b"", bytes(body), flags=re.M
+            )
+            again = max(again, count)
+    if again:
+        times = "once" if again == 1 else f"{again} times"
+        notes.append(
+            f"The header stands {times} more between the rows, as where a logger begins anew: left out."
+        )
     if dialect.separator == " ":
         body = b"\n".join(_BLANKS.sub(b"\t", line.strip()) for line in bytes(body).splitlines())
         dialect = replace(dialect, separator="\t")
@@ -119,7 +132,7 @@ def _arrow(body: bytes | memoryview, dialect: Dialect, chosen: list[int], types:
         convert_options=csv.ConvertOptions(
             column_types=types,
             include_columns=[_field(k) for k in chosen],
-            null_values=_MISSING,
+            null_values=[*_MISSING, *(f" {mark}" for mark in _MISSING)],  # of rows "1, -, 2"
             strings_can_be_null=True,
             decimal_point=dialect.decimal,
         ),

@@ -30,7 +30,7 @@ class Dialect:
     """How a text table is written. ``separator`` " " stands for any run of blanks; ``start`` is where rows begin.
 
     ``in_cells``: the columns whose numbers have their unit behind them, by place, and that unit, which is also in ``units``.
-    ``unnamed``: how many columns of the first rows have values, but no name.
+    ``unnamed``: how many columns of the first rows have values, but no name. ``header``: its lines, as they stand in the table.
     """
 
     separator: str
@@ -40,6 +40,7 @@ class Dialect:
     start: int
     in_cells: dict[int, str] = field(default_factory=dict)
     unnamed: int = 0
+    header: tuple[str, ...] = ()
 
 
 def detect(data: bytes, source: str) -> Dialect:
@@ -84,7 +85,10 @@ def detect(data: bytes, source: str) -> Dialect:
         names = (TIME, *names[1:])  # pandas' index
     others = zip(columns[1:], names[1:], strict=False)  # the first may be an index
     unnamed = sum(any(column) for column, name in others if not name)
-    return Dialect(separator, decimal, names, units, _after_lines(data, start, rows), in_cells, unnamed)
+    written = () if joined is not None else tuple(lines[:rows])
+    return Dialect(
+        separator, decimal, names, units, _after_lines(data, start, rows), in_cells, unnamed, written
+    )
 
 
 def _first_lines(data: bytes, start: int) -> list[str]:

@@ -43,14 +43,18 @@ _BACK, _LONGEST_STEP = 0.2, 1e6  # steps run back often, and are short
 _EIGHT = 8  # hexadecimal digits of a 29-bit identifier
 _BITS = 29  # of an identifier at most
 
-_TIMES = dict.fromkeys(("timestamp", "time", "timestampepoch", "time_s", "t"), 1.0) | dict.fromkeys(
-    ("time_ms", "timems"), 1e-3
-)
-_IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier")
+_TIMES = dict.fromkeys(("timestamp", "time", "timestampepoch", "time_s", "t", "abs time(sec)"), 1.0)
+_TIMES |= dict.fromkeys(("time_ms", "timems"), 1e-3) | {"time stamp": 1e-6}  # SavvyCAN's
+_IDENTIFIERS = ("arbitration_id", "id", "can_id", "canid", "identifier", "arb id")
 _DATA = ("data", "databytes", "payload", "data_hex")
-_SOURCES, _EXTENDED = ("source", "src", "sa"), ("extended", "ide")
-_BUSES = ("bus", "channel")
-_YES, _NO = ("1", "true"), ("", "0", "false")
+_BYTES = [
+    [f"{letter}{k}" for k in range(first, first + 8)] for letter, first in (("d", 1), ("b", 1), ("data", 0))
+]
+_SOURCES, _EXTENDED = ("source", "src", "sa"), ("extended", "ide", "xtd", "type")
+_BUSES = ("bus", "channel", "network")
+_YES, _NO = ("1", "true", "t"), ("", "0", "false", "f")
+_DATE = re.compile(r"(\d{8})T(\d{6})(?:\.(\d+))?$")  # CL2000's
+_PREAMBLE = 100  # lines before the header
 
 # What the first lines of each form look like.
 _TRC = re.compile(r"\s*\d+\)\s+\d+(?:\.\d+)?\s+(?:\d+\s+)?(?:[RT]x\s+)?[0-9A-Fa-f]{4,8}\s", re.IGNORECASE)
@@ -75,8 +79,8 @@ def is_candump(head: bytes) -> bool:
 
 def is_frame_table(head: bytes) -> bool:
     """Whether a file that begins so is a table with columns of stamps, identifiers and payloads."""
-    header = next((line for line in head.splitlines() if line.strip()), b"").decode("utf-8", "replace")
-    return _is_frame_header(_cells(header)[1])
+    lines = (line.decode("utf-8", "replace") for line in head.splitlines()[:_PREAMBLE])
+    return any(_is_frame_header(_cells(line)[1]) for line in lines)
 
 
 def lines_are_like(head: bytes, *forms: re.Pattern[str]) -> bool:
@@ -259,31 +263,50 @@ def _asc_identifier(text: str, bus: int, base: int) -> int | None:
 
 
 def table(lines: Iterable[str], count: Count, frames: Frames) -> Iterator[Frame]:
-    """Frames of a table with time, identifier (or pgn and source) and data columns; a line that holds none is counted."""
+    """Frames of a table with time, identifier (or pgn and source) and data columns; a line that holds none is counted.
+
+    The payload is in one column, or in one for each byte; numbers are hexadecimal, unless a byte has three digits.
+    """
     numbered = ((number, line) for number, line in enumerate(lines, 1) if line.strip())
-    separator, names = _cells(next(numbered, (0, ""))[1])
+    before = itertools.islice(numbered, _PREAMBLE)
+    separator, names = next((c for _, line in before if _is_frame_header((c := _cells(line))[1])), (",", []))
+    if not names:
+        return
     head = list(itertools.islice(numbered, _HEAD))
-    at = next((names.index(name) for name in _BUSES if name in names), len(names))
-    number_buses(
-        {cell.strip() for _, line in head for cell in line.split(separator)[at : at + 1]}, count.buses
-    )
-    for number, line in itertools.chain(head, numbered) if _is_frame_header(names) else ():
+    some = [dict(zip(names, line.rstrip("\r\n").split(separator), strict=False)) for _, line in head]
+    bus_name = next((name for name in _BUSES if name in names), None)
+    number_buses({row[bus_name].strip() for row in some if bus_name in row}, count.buses)
+    parts = next((own for own in _BYTES if set(own) <= set(names)), [])
+    base = 10 if any(len(row.get(name, "").strip()) > 2 for row in some for name in parts) else 16
+    for number, line in itertools.chain(head, numbered):
         if frames.leaves_out_next():
             continue
         cells = line.rstrip("\r\n").split(separator)
         row = dict(zip(names, cells, strict=False))
         try:
-            if len(cells) != len(names):
+            if len(cells) < len(names) or any(cell.strip() for cell in cells[len(names) :]):
                 raise ValueError("a row of another width")
             if any(row.get(mark, "").strip().lower() not in _NO for mark in ("remote", "error")):
                 continue
-            (time, scale), *_ = ((row[name], _TIMES[name]) for name in names if name in _TIMES)
-            payload = _payload(next(row[name] for name in names if name in _DATA))
-            bus = next((row[name].strip() for name in _BUSES if name in row), "")
-            identifier = on_bus(_identifier(row), bus_of(bus, count.buses))
-            yield scale * float(time.replace(",", ".")), identifier, payload
+            time = next(_scaled(row[name], _TIMES[name]) for name in names if name in _TIMES)
+            if parts:
+                payload = bytes(int(row[name], base) for name in parts if row[name].strip())
+            else:
+                payload = _payload(next(row[name] for name in names if name in _DATA))
+            bus = row[bus_name].strip() if bus_name else ""
+            identifier = on_bus(_identifier(row, base), bus_of(bus, count.buses))
+            yield time, identifier, payload
         except (ValueError, binascii.Error):
             count.add(number, line)
+
+
+def _scaled(text: str, scale: float) -> float:
+    """A stamp [s]: a number times ``scale``, or a date as 20240914T100000.003."""
+    date = _DATE.match(text.strip())
+    if date is None:
+        return scale * float(text.replace(",", "."))
+    at = datetime.strptime(f"{date[1]}{date[2]}", "%Y%m%d%H%M%S").replace(tzinfo=UTC)
+    return at.timestamp() + float(f"0.{date[3] or 0}")
 
 
 def _cells(header: str) -> tuple[str, list[str]]:
@@ -293,10 +316,13 @@ def _cells(header: str) -> tuple[str, list[str]]:
 
 
 def _is_frame_header(names: list[str]) -> bool:
-    return all(any(name in known for name in names) for known in (_TIMES, _DATA, (*_IDENTIFIERS, "pgn")))
+    has_data = any(name in _DATA for name in names) or any(set(own) <= set(names) for own in _BYTES)
+    return has_data and all(
+        any(name in known for name in names) for known in (_TIMES, (*_IDENTIFIERS, "pgn"))
+    )
 
 
-def _identifier(row: dict[str, str]) -> int:
+def _identifier(row: dict[str, str], base: int) -> int:
     """The identifier of a row: as it stands there, or made of group and source; raises ValueError where it is none."""
     written, source, extended = (
         next((row[name].strip().strip('"').lower() for name in names if name in row), None)
@@ -305,7 +331,7 @@ def _identifier(row: dict[str, str]) -> int:
     if written is None:
         return EXTENDED | _checked(int(row["pgn"]) << 8) | (0xFE if source is None else int(source) & 0xFF)
     text = written.removeprefix("0x").rstrip("hx")
-    number = _checked(int(text, 16))
+    number = _checked(int(text, 16 if written.startswith("0x") else base))
     wide = number > 0x7FF or (len(text) == _EIGHT if extended is None else extended in _YES)
     return number | EXTENDED if wide else number
 
