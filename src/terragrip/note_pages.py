@@ -49,7 +49,7 @@ PAGES = (
     ("the wheels drive on as hard as before", "checks#channels-that-are-dead-held-or-cut"),
     ("neither the motion nor another force answers", "checks#a-part-of-the-drive"),
     ("from one sample to the next, and other wheels", "checks#a-part-of-the-drive"),
-    (": its scale changed, and", "checks#a-part-of-the-drive"),
+    (": its scale changed, ", "checks#a-part-of-the-drive"),
     ("in all rows, which no cell reads", "checks#channels-that-are-dead-held-or-cut"),
     ("no ground pushes a vehicle", "checks#units-scales-and-zeros"),
     ("the zero of drawbar_force drifts", "checks#a-part-of-the-drive"),

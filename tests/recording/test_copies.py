@@ -7,7 +7,7 @@ import pytest
 
 from steady_drive import TIME, pulling
 from terragrip.recording import Recording, unit_warnings
-from terragrip.recording.copies import copy_warnings, replay_warnings
+from terragrip.recording.copies import replay_warnings, speed_copy_warnings, torque_copy_warnings
 from terragrip.vehicle import Vehicle
 
 Columns = dict[str, np.ndarray]
@@ -15,7 +15,8 @@ TORQUES = [f"drive_torque_{wheel}" for wheel in ("fl", "fr", "rl", "rr")]
 
 
 def notes_on(columns: Columns, vehicle: Vehicle) -> list[str]:
-    return copy_warnings(Recording.from_frame(columns), vehicle)
+    log = Recording.from_frame(columns)
+    return torque_copy_warnings(log, vehicle) + speed_copy_warnings(log, vehicle)
 
 
 def test_wheels_of_their_own_say_nothing(columns: Columns, vehicle: Vehicle) -> None:

@@ -39,3 +39,19 @@ def test_a_last_pulse_that_is_kept_at_stops_is_named() -> None:
 )
 def test_others_are_not(right: Recording) -> None:
     assert waiting_warnings(right) == []
+
+
+def test_a_logger_that_hangs_while_it_rolls_waits_for_no_pulse() -> None:
+    """Four wheels kept a value each at one slow place, and a stop was said to look stuck."""
+    rng = np.random.default_rng(5)
+    rows = np.arange(len(TIME))
+    hung = (TIME > 37.0) & (TIME < 39.5)
+    last = np.where(hung, np.argmax(hung), rows)
+    speed = np.abs(np.sin(TIME / 12)) + 0.02
+    wheels = {
+        f"wheel_speed_{w}": 5 * speed + 0.01 * rng.standard_normal(len(TIME)) for w in ("fl", "fr", "rl")
+    }
+    channels = {"ground_speed": speed + 0.001 * rng.standard_normal(len(TIME)), **wheels}
+    assert waiting_warnings(Recording(TIME, {n: v[last] for n, v in channels.items()})) == []
+    kept = {n: v[last] if n in wheels else v for n, v in channels.items()}
+    assert len(waiting_warnings(Recording(TIME, kept))) == 1

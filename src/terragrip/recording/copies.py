@@ -34,26 +34,30 @@ _FACTOR = np.int64(
 )  # Knuth's of a linear congruential generator: it spreads all bits but the last
 
 
-def copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
-    """Sentences on torques of several wheels that are one signal, and on speeds of both sides of an axle that are."""
-    notes = [
+def torque_copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """Sentences on torques of several wheels that are one signal."""
+    return [
         f"{', '.join(group)} are one signal: how wheels share it was not measured, so only their mean adhesion is. Single wheels' "
         "intervals hold an open differential's friction, a lock only where their speed is one signal, too. If it is the sum of their "
         "torques, divide it ('scale:' in the profile)."
         for group in one_signal(recording, [f"drive_torque_{wheel}" for wheel in vehicle.wheels])
     ]
+
+
+def speed_copy_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
+    """A sentence on speeds of both sides of an axle that are one signal."""
     turns, pairs = _turns(recording, vehicle), []
     for axle in vehicle.axles.values():
         names = [f"wheel_speed_{wheel}" for wheel in (axle.wheels[0], axle.wheels[-1])]
         own = len(axle.wheels) < 2 or not one_signal(recording, names, turns)
         if not own and not _is_of_the_ground(recording, names[0]):
             pairs.append(" and ".join(names))
-    if pairs:
-        notes.append(
-            f"{', '.join(pairs)} are {'each ' * (len(pairs) > 1)}one signal: in turns the slips of both sides are wrong, unless a lock "
-            "couples the wheels. Give it once, as wheel_based_speed [m/s], or the wheels' own speeds."
-        )
-    return notes
+    if not pairs:
+        return []
+    return [
+        f"{', '.join(pairs)} are {'each ' * (len(pairs) > 1)}one signal: in turns the slips of both sides are wrong, unless a lock "
+        "couples the wheels. Give it once, as wheel_based_speed [m/s], or the wheels' own speeds."
+    ]
 
 
 def _turns(recording: Recording, vehicle: Vehicle) -> bool:

@@ -47,7 +47,10 @@ def waiting_warnings(recording: Recording) -> list[str]:
         long = (lasts > _KEPT) & (counts > _PULSES) & (what[starts] > 0.0)
         if not long.any():
             continue
-        slow = np.add.reduceat(np.interp(when, at, speed), starts) / counts < _STANDS * quantile(speed, 0.95)
+        meanwhile = np.interp(when, at, speed)
+        slow = np.add.reduceat(meanwhile, starts) / counts < _STANDS * quantile(speed, 0.95)
+        low, high = (pick.reduceat(meanwhile, starts) for pick in (np.minimum, np.maximum))
+        slow &= (low < high) | (high == 0.0)  # else the logger hung
         kept = what[starts][long & slow]
         kept = kept[kept > _FINE * quantum(what)]  # a wheel that spins evenly keeps a coarse value, too
         if len(kept) > np.sum(long & ~slow):  # else the logger repeats values, driving or not

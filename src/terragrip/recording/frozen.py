@@ -234,22 +234,27 @@ def _often(name: str, time: Floats, values: Floats) -> list[str]:
 
 
 def cut_warnings(recording: Recording) -> list[str]:
-    """A sentence on each channel whose greatest or least value while driving is a limit of what it can show."""
+    """A sentence on the channels whose greatest or least value while driving is a limit of what they can show."""
     ground = recording.channels.get("ground_speed")
     if ground is None or is_one_value(ground):
         return []
     speed = np.abs(filled_channel(recording, "ground_speed"))
     driving = speed > DRIVING * quantile(speed, 0.95)
+    ends: dict[tuple[float, str], dict[str, float]] = {}
+    for name, values in recording.channels.items():
+        if name.startswith(_RANGED) and not is_one_value(values):
+            for value, beyond, share in _cut(recording.time, np.where(driving, values, np.nan)):
+                ends.setdefault((value, beyond), {})[name] = share
     return [
-        note
-        for name, values in recording.channels.items()
-        if name.startswith(_RANGED) and not is_one_value(values)
-        for note in _cut(name, recording.time, np.where(driving, values, np.nan))
+        f"{', '.join(shares)} {'are' if len(shares) > 1 else 'is'} {value:.4g} in {max(shares.values()):.0%} of the driving and never "
+        f"{beyond}: the range of sensor or column ends there, and what was beyond is lost. Take a wider range, or leave these cells empty; "
+        "a motor's own limit may stay."
+        for (value, beyond), shares in ends.items()
     ]
 
 
-def _cut(name: str, time: Floats, values: Floats) -> list[str]:
-    """On each end of a channel (n,), of rows of driving."""
+def _cut(time: Floats, values: Floats) -> list[tuple[float, str, float]]:
+    """Each end of a channel (n,) of rows of driving, what never comes beyond it, and in which share of them the channel is there."""
     when, what = known_part(time, values)
     if len(what) < 2 * _LEAST:
         return []
@@ -265,12 +270,7 @@ def _cut(name: str, time: Floats, values: Floats) -> list[str]:
     if len(counts) < _LEAST or not _is_restless(when, what):
         return []
     most = float(counts[1:-1].max())
-    return [
-        f"{name} is {value:.4g} in {times / len(what):.0%} of the driving and never {beyond}: the range of its sensor or "
-        "column ends there, and what was beyond is lost. Take a wider range, or leave these cells empty; a motor's own limit may stay."
-        for value, beyond, times in ends
-        if times >= _OFTENER * most
-    ]
+    return [(value, beyond, times / len(what)) for value, beyond, times in ends if times >= _OFTENER * most]
 
 
 def overflow_warnings(recording: Recording) -> list[str]:

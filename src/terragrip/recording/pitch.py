@@ -39,7 +39,7 @@ _CAUSES = (
 
 
 def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[str]:
-    """Sentences on a pitch of another sign, axis, scale or instant than the accelerometer's; ``forward`` (n,) [m/s²] is its reading."""
+    """Sentences on a pitch of another sign, axis or scale than the accelerometer's; ``forward`` (n,) [m/s²] is its reading."""
     if means.climb is None:
         return []
     observed = forward - means.change
@@ -65,7 +65,7 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
         distance, cause = min((abs(float(np.log(times / size))), text) for size, text in _CAUSES)
         reason = f"it may be {cause} for it in the profile" if distance < 0.25 else "check its unit and scale"
         return [f"pitch is {times:.2g} times the climb that the accelerometer shows: {reason}."]
-    return _late_warnings(recording, means, means.climb, observed)
+    return []
 
 
 def zero_warnings(means: Means, forward: Floats) -> list[str]:
@@ -86,10 +86,16 @@ def zero_warnings(means: Means, forward: Floats) -> list[str]:
     ]
 
 
-def _late_warnings(recording: Recording, means: Means, climb: Floats, observed: Floats) -> list[str]:
-    """A pitch that is late: to first order the measured climb is the pitch and its rate times the lag."""
-    pitch = recording.channels["pitch"]
+def pitch_lag_warnings(recording: Recording, means: Means | None) -> list[str]:
+    """A sentence on a pitch that is late or early by the accelerometer, whose signs and scales are right: to first order the measured climb
+    is the pitch and its rate times the lag."""
+    if means is None or means.climb is None or "acceleration_x" not in recording.channels:
+        return []
+    pitch, climb = recording.channels["pitch"], means.climb
+    observed = means.of(recording.channels["acceleration_x"]) - means.change
     if _FEWEST * median(np.diff(recording.time[np.isfinite(pitch)])) > means.length:
+        return []
+    if means.fit(observed, climb).alike < _ALIKE:
         return []
     plain = STANDARD_GRAVITY * window_means(np.sin(pitch), means.place, means.count)
     rate = np.r_[np.nan, (plain[2:] - plain[:-2]) / (2 * means.length), np.nan][means.rows]

@@ -18,7 +18,7 @@ from terragrip.physics.slip import middle_speed
 from terragrip.recording.axles import axle_warnings, free_axle_warnings
 from terragrip.recording.brake import without_braked_torques
 from terragrip.recording.codes import without_codes
-from terragrip.recording.copies import copy_warnings, replay_warnings
+from terragrip.recording.copies import replay_warnings, speed_copy_warnings, torque_copy_warnings
 from terragrip.recording.counted import counted_warnings, waiting_warnings
 from terragrip.recording.doubled import doubled_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
@@ -30,6 +30,7 @@ from terragrip.recording.interpolated import interpolated_warnings
 from terragrip.recording.leaps import leap_warnings
 from terragrip.recording.mechanics import Means, means_of, motion_warnings, shortfall_warnings
 from terragrip.recording.pace import clock_warnings, drift_warnings, odometry_warnings
+from terragrip.recording.pitch import pitch_lag_warnings
 from terragrip.recording.plain_signs import plain_sign_warnings
 from terragrip.recording.plain_units import (
     angle_warnings,
@@ -174,7 +175,21 @@ _WAY = (*_TIME, "against")
 """and takes it that rims and ground go one way."""
 _SPEEDS = (*_WAY, "reverse", "rescaled", "sides", "rims", "free axles")
 _COURSES = (*_SPEEDS, "positions")
-_FORCES = (*_WAY, "signs", "uneven torques", "motion", "acceleration", "zeros", "leaps", "overflows")
+_INSTANTS = ("inertial", "pitch lag")
+"""Where a sensor is late the rest of what is compared with it follows."""
+_FORCES = (
+    *_WAY,
+    *_INSTANTS,
+    "rims",
+    "angles",
+    "signs",
+    "uneven torques",
+    "motion",
+    "acceleration",
+    "zeros",
+    "leaps",
+    "overflows",
+)
 
 _EACH = (
     Check("clock", lambda log: clock_warnings(log.whole, log.vehicle)),
@@ -196,6 +211,8 @@ _EACH = (
             "acceleration",
             "frozen",
             "dropouts",
+            "copied speeds",
+            "spacing",
         ),
     ),
     Check("rescaled", lambda log: rescaled_warnings(log.as_measured, log.vehicle, log.turn, log.track), _WAY),
@@ -222,7 +239,7 @@ _EACH = (
         "turn rate",
         lambda log: turn_rate_warnings(
             log.rows,
-            None if log.found("exchanged wheels") else log.any_vehicle,
+            None if any(map(log.found, ("exchanged wheels", "rims", "copied speeds"))) else log.any_vehicle,
             None if log.found("positions") else log.track,
         ),
         _WAY,
@@ -240,13 +257,19 @@ _EACH = (
     Check(
         "motion",
         lambda log: motion_warnings(log.rows, log.any_vehicle, log.means_of_even_torques),
-        (*_WAY, "reverse", "signs", "overflows"),
+        (*_WAY, "reverse", "rims", "angles", "signs", "overflows", "spacing"),
         needs_wheels=False,
     ),
     Check(
         "acceleration",
         lambda log: acceleration_warnings(log.courses),
-        (*_COURSES, "signs", "motion"),
+        (*_COURSES, *_INSTANTS, "angles", "signs", "motion"),
+        needs_wheels=False,
+    ),
+    Check(
+        "pitch lag",
+        lambda log: pitch_lag_warnings(log.rows, log.means),
+        (*_WAY, "inertial", "angles", "motion"),
         needs_wheels=False,
     ),
     Check(
@@ -255,9 +278,14 @@ _EACH = (
         (*_WAY, "turn rate", "exchanged wheels", "motion"),
         needs_wheels=False,
     ),
-    Check("copies", lambda log: copy_warnings(log.whole, log.vehicle), _WAY),
+    Check("copied torques", lambda log: torque_copy_warnings(log.whole, log.vehicle), _WAY),
+    Check("copied speeds", lambda log: speed_copy_warnings(log.whole, log.vehicle), _WAY),
     Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means), _FORCES),
-    Check("rim noise", lambda log: noisy_rim_warnings(log.whole, log.vehicle), (*_TIME, "counted", "rims")),
+    Check(
+        "rim noise",
+        lambda log: noisy_rim_warnings(log.whole, log.vehicle),
+        (*_TIME, "counted", "rims", "sides", "frozen"),
+    ),
     Check(
         "balance",
         lambda log: balance_warnings(log.courses, log.vehicle),
@@ -276,11 +304,15 @@ _EACH = (
     Check(
         "light",
         lambda log: light_warnings(log.rows, log.vehicle, log.means),
-        (*_SPEEDS, *_FORCES, "torques", "balance", "slower"),
+        (*_SPEEDS, *_FORCES, "torques", "balance", "shortfall", "slower", "frozen"),
     ),
     Check("inertial", lambda log: inertial_warnings(log.rows, log.vehicle), (*_WAY, "joint")),
     Check("zeros", lambda log: zero_warnings(log.rows, log.vehicle, log.means), _WAY),
-    Check("leaps", lambda log: leap_warnings(log.rows, log.vehicle), (*_WAY, "zeros")),
+    Check(
+        "leaps",
+        lambda log: leap_warnings(log.rows, log.vehicle),
+        (*_WAY, "zeros", "rescaled", "frozen", "dropouts"),
+    ),
     Check("counted", lambda log: counted_warnings(log.whole), _TIME, needs_wheels=False),
     Check("frozen", lambda log: frozen_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),
     Check("waiting", lambda log: waiting_warnings(log.whole), (*_TIME, "counted"), needs_wheels=False),

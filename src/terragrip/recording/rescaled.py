@@ -104,10 +104,10 @@ def _of_axle(
         moved = [abs(median(one[at:]) - median(one[:at])) for one in both]
         if moved[1] > moved[0]:
             factor, name = 1 / factor, names[1]
-    wrong = "slip" if speed else "adhesion"
+    wrong = ", and slip" if speed else ", or its zero moved, and adhesion"
     return [
         f"From {moment(instant)} s on {name} is {factor:.2f} times what it was before beside the axle's other wheel, from one sample to "
-        f"the next{either}: its scale changed, and {wrong} is so far off before or after. Correct it there, or estimate the parts apart."
+        f"the next{either}: its scale changed{wrong} is so far off before or after. Correct it there, or estimate the parts apart."
     ]
 
 

@@ -66,14 +66,16 @@ def rim_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 
 def _units_off(vehicle: Vehicle, ratios: dict[str, float]) -> list[str]:
     """Sentences on the wheels whose ``ratios`` of rim to ground speed no slip explains, those of one cause together."""
-    # of wheels of unlike radii one factor is none of the radii
-    unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
-    shared = unlike and len(ratios) > 1 and max(ratios.values()) < np.sqrt(_APART) * min(ratios.values())
+    radii: dict[str, float | None] = dict(vehicle.radii)
+    if len(ratios) > 1 and max(ratios.values()) < np.sqrt(_APART) * min(ratios.values()):
+        # one factor is of one cause, and of wheels of unlike radii none of the radii
+        unlike = max(vehicle.wheel_radius) > _APART * min(vehicle.wheel_radius)
+        radii = dict.fromkeys(radii, None if unlike else float(np.mean(vehicle.wheel_radius)))
+        ratios = dict.fromkeys(ratios, median(np.array(list(ratios.values()))))
     result: dict[str, list[tuple[str, float]]] = {}
     for wheel, ratio in ratios.items():
         if not RATIOS[0] <= ratio <= RATIOS[1]:
-            why = _cause(ratio, None if shared else vehicle.radii[wheel])
-            result.setdefault(why, []).append((wheel, ratio))
+            result.setdefault(_cause(ratio, radii[wheel]), []).append((wheel, ratio))
     return [
         f"The wheel speed of {', '.join(wheel for wheel, _ in those)} times the radius is "
         f"{np.median([ratio for _, ratio in those]):.3g} times the ground speed: {why}."
