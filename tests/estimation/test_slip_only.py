@@ -316,3 +316,20 @@ def test_a_turnabout_on_slick_ground_is_not_stuck(stands: bool) -> None:
     assert stuck.any(axis=1).all()
     first = since[np.argmax(stuck, axis=1)]
     assert (np.abs(first - (0.45 + 1.4 / 1.2 + 0.5)) < 0.2).all()
+
+
+@pytest.mark.parametrize(
+    ("radius", "factor", "asked"), [(0.3, 3.6 * 0.3, True), (0.3, 1.0, False), (0.28, 1.0, False)]
+)
+def test_a_zero_slip_radius_of_rims_in_kmh_is_asked_for(radius: float, factor: float, asked: bool) -> None:
+    """A car's wheels in km/h read as rad/s: slip was .08 too high, and 'calibrate' was offered for the radius of 1/3.6 m."""
+    draws = np.random.default_rng(7)
+    time = np.arange(0, 240, 0.1)
+    v = 1.5 + 0.3 * np.sin(time / 5)
+    slip = np.where(time % 40 < 20, 0.001, 0.08)
+    columns = {"time": time, "ground_speed": v + 0.01 * draws.standard_normal(len(time))}
+    for wheel in ("fl", "fr", "rl", "rr"):
+        columns[f"wheel_speed_{wheel}"] = factor * v / (1 - slip) / radius
+    notes = tg.estimate(tg.Recording.from_frame(columns), robot(radius)).notes
+    question = "is the wheel speed its rim's in km/h? Then give 'scale: 0.92593, unit: rad/s' in a profile"
+    assert any(question in note for note in notes) == asked

@@ -20,6 +20,8 @@ from terragrip.vehicle import Vehicle
 _MOVING = 0.1  # m/s
 _APART = 2.0  # s between ground speeds
 _BLIND = 5  # rows with rims at rest while the vehicle moves
+_OF_KMH = 1 / 3.6  # m: the radius of any rim whose speed in km/h is read as rad/s
+_NEARLY = 0.01  # of it
 _WIDEST = 0.5  # m/s: a wider dead band is a missing speed
 WHAT_IS_MISSING = (
     "There is no drive torque: slip, speeds and distance are estimated, and maps of slip can be drawn; adhesion, soil "
@@ -125,6 +127,16 @@ def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
             "",
         )
     sentence = f"Zero-slip {at}, from {zero.windows} windows of the lightest work{beside}"
+    if (
+        rim.has_radius
+        and abs(zero.ratio * base / _OF_KMH - 1) < _NEARLY
+        and abs(zero.ratio - 1) > 2 * rim.spread
+    ):
+        # nearly the file's: no other check can tell them apart
+        scale = f"'scale: {_OF_KMH / base:.5g}, unit: rad/s'"
+        return [
+            f"{sentence}. It is 1/3.6 m: is the wheel speed its rim's in km/h? Then give {scale} in a profile."
+        ]
     if zero.doubt:
         return [f"{sentence}; {zero.doubt}."]
     if learns:
