@@ -140,3 +140,23 @@ def test_a_file_that_goes_on_where_another_ends_is_refused(tmp_path: Path) -> No
     with pytest.raises(InputError, match=r"2\.csv: has no channel that the logs before it lack") as caught:
         tg.read([tmp_path / "1.csv", tmp_path / "2.csv"])
     assert "made one file first" in str(caught.value)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.3])
+def test_a_logger_for_each_wheel_is_set_right_by_the_wheels(late: float) -> None:
+    """By the first one's slow receiver, .3 s late, the other wheel's clock was shifted: one wheel's speed and torque stood beside the
+    other's of another instant."""
+    draws = np.random.default_rng(4)
+    time = np.arange(0.0, 200.0, 0.05)
+    receiver = np.where(np.arange(len(time)) % 20 == 0, speed_at(time - 0.3), np.nan)
+    noise = 0.02 * draws.standard_normal((2, len(time)))
+    left = pd.DataFrame(
+        {"time": time, "wheel_speed_l": 5 * speed_at(time) + noise[0], "ground_speed": receiver}
+    )
+    right = pd.DataFrame({"time": time, "wheel_speed_r": 5 * speed_at(time + late) + noise[1]})
+    joined = tg.read([left, right])
+    (note,) = [note for note in joined.notes if "clock of" in note]
+    ahead = re.search(r"is ([\d.]+) ± ([\d.]+) s (ahead of|behind)", note)
+    assert ahead is not None
+    assert float(ahead[1]) == pytest.approx(late, abs=0.02)
+    assert ("was shifted by that" in note) == bool(late)

@@ -14,7 +14,7 @@ from terragrip.errors import InputError
 from terragrip.formats.conversion import Part
 from terragrip.formats.signals import Signal, SignalLog
 from terragrip.recording import Recording
-from terragrip.recording.lag import lag_between, speed_of
+from terragrip.recording.lag import lag_between, speed_of, wheels_of
 from terragrip.recording.schema import TIME, unit_of
 
 _REACH = 60.0  # s that clocks which both count from 1970 may differ by: leap seconds are 18 s, time zones are distinguished
@@ -83,6 +83,10 @@ def _shift(reference: Part, part: Part) -> tuple[float, str]:
         stated = float(part.time[0] - reference.time[0])  # only one counts from 1970: they start together
     name = Path(str(part.source)).name
     mine, theirs = speed_of(reference.time, reference.columns), speed_of(part.time, part.columns)
+    if mine is not None and theirs is not None and (mine.pace is None) != (theirs.pace is None):
+        # Like with like, where both have wheels: a ground speed lags behind them, and is slower to come.
+        alike = wheels_of(reference.time, reference.columns), wheels_of(part.time, part.columns)
+        mine, theirs = alike if None not in alike else (mine, theirs)
     result = None
     if mine is not None and theirs is not None:
         result = lag_between(mine, replace(theirs, time=theirs.time - stated), reach=reach)
