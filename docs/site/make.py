@@ -82,6 +82,7 @@ CONTENTS: dict[str, list[str]] = {
         "architecture",
         "architecture-history",
         "live-history",
+        "checks-history",
         "formats-history",
         "kernel",
         "tuned-numbers",
