@@ -353,7 +353,7 @@ def test_without_motion_or_vehicle_nothing_is_said(vehicle: Vehicle) -> None:
     log = Recording(time, {"ground_speed": speed, "acceleration_x": -change})
     notes = motion_warnings(log, None, means_of(log))
     assert notes == [
-        "acceleration_x is not the change of ground speed but its opposite: forward is positive: write 'sign: -1' for it in the profile."
+        "acceleration_x is not the change of ground speed but its opposite: forward is positive; write 'sign: -1' for it in the profile."
     ]
 
 

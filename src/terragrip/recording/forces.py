@@ -177,13 +177,18 @@ def acceleration_warnings(courses: Courses | None) -> list[str]:
     # A receiver that filters changes less than the rims do.
     if not all(each.is_off(_ACCELERATION) for each in found):
         return []
-    flat = "acceleration_x is not the change of ground speed"
     if found[0].value < 0:
-        sentence = f"{flat} but its opposite: forward is positive: write 'sign: -1' for it in the profile."
-        return [WrongSign(sentence, ["acceleration_x"], "the opposite of the change of ground speed")]
+        return [opposite_acceleration()]
     return [
-        f"{flat} but {found[0].value:.2g} times that: it may be in g (write 'unit: g' in the profile), or not the axis that points forward."
+        f"acceleration_x is not the change of ground speed but {found[0].value:.2g} times that: it may be in g (write 'unit: g' in the "
+        "profile), or not the axis that points forward."
     ]
+
+
+def opposite_acceleration(too: str = "") -> WrongSign:
+    """The sentence on an accelerometer of the opposite sign."""
+    shown = f"is not the change of ground speed but its opposite{too}"
+    return WrongSign.of(["acceleration_x"], shown, "forward is")
 
 
 def balance_warnings(courses: Courses | None, vehicle: Vehicle) -> list[str]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from terragrip.arrays import Bools, Floats, Ints
 from terragrip.recording.brake import braked
+from terragrip.recording.forces import opposite_acceleration
 from terragrip.recording.once import once
 from terragrip.recording.pitch import pitch_warnings, zero_warnings
 from terragrip.recording.pulls import PULL, pull_warnings, silent_cell
@@ -45,7 +46,6 @@ _ROUNDING = 1e-12  # of a mean of equal values
 _OFFSET = 0.4  # m/s²: .04 of the weight, two degrees of mounting (right logs: .25 at most)
 _OFFSET_SURE = 4.0  # of the bias that the vehicle file states,
 _OFFSET_LEAST = 0.2  # and m/s²: .02 of the weight
-_SIGN = "forward is positive: write 'sign: -1' for {} in the profile"
 
 
 @dataclass(frozen=True)
@@ -245,10 +245,9 @@ def _balance_warnings(
 ) -> list[str]:
     """acceleration_x and the torques against each other, and where they differ, each against the change of ground speed."""
     moved = means.fit(forward, means.change, beside=means.climb)
-    flat = "acceleration_x is not the change of ground speed"
     backward = moved.is_off() and moved.slope + _SURE * moved.error < 0
     if not means.thrusts or vehicle is None:
-        return [_opposite(f"{flat} but its opposite: ")] if backward else []
+        return [opposite_acceleration()] if backward else []
     thrust = means.thrust
     driven = means.fit(thrust, means.change, beside=means.climb)
     together = means.fit(thrust, forward)
@@ -256,13 +255,13 @@ def _balance_warnings(
     if exchanged:
         return [exchanged]
     if not together.is_another_scale:  # a hill or a pull that nobody knows hides the proportion, not the sign
-        return [_opposite(f"{flat} but its opposite: ")] if backward and together.slope < 0 else []
+        return [opposite_acceleration()] if backward and together.slope < 0 else []
     if moved.is_off() and moved.distance > driven.distance:
         if together.slope < 0:
-            return [_opposite(f"{flat} but its opposite, and the drive torques contradict it too: ")]
+            return [opposite_acceleration(", and the drive torques contradict it too")]
         return [
-            f"{flat} but {1 / together.slope:.2g} times what the drive torques give for {vehicle.mass:.4g} kg: it may be in g (write "
-            "'unit: g' in the profile), or not the axis that points forward."
+            f"acceleration_x is not the change of ground speed but {1 / together.slope:.2g} times what the drive torques give for "
+            f"{vehicle.mass:.4g} kg: it may be in g (write 'unit: g' in the profile), or not the axis that points forward."
         ]
     if driven.is_off() and driven.distance > moved.distance:
         # A vehicle that digs in slows down the harder it is driven.
@@ -275,11 +274,6 @@ def _balance_warnings(
         f"The drive torques over radius and mass and acceleration_x go {wrong}, and the ground speed does not show which of them is wrong: "
         "check their signs and units, the wheel radius and the mass."
     ]
-
-
-def _opposite(found: str) -> WrongSign:
-    shown = "the opposite of the change of ground speed"
-    return WrongSign(f"{found}{_SIGN.format('it')}.", ["acceleration_x"], shown)
 
 
 def _exchanged(recording: Recording, vehicle: Vehicle, means: Means, forward: Floats, together: Fit) -> str:
@@ -302,7 +296,7 @@ def _exchanged(recording: Recording, vehicle: Vehicle, means: Means, forward: Fl
         return "acceleration_y varies with the drive torques and acceleration_x does not: the two axes may be exchanged."
     odd = [f"drive_torque_{wheel}" for wheel in backward]
     shown = "the other wheels' torques vary with acceleration_x, and these against it"
-    return WrongSign(f"{', '.join(odd)}: {shown}; {_SIGN.format('each')}.", odd, shown)
+    return WrongSign.of(odd, shown, "forward is", who=f"{', '.join(odd)}:")
 
 
 def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
@@ -313,9 +307,9 @@ def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
     if means.climb is not None:
         uphill = means.fit(thrust - means.change, means.climb)
         if uphill.alike < -_ALIKE and np.nanmean(thrust) > 0:
-            shown = "falls where the wheels are driven harder at one speed"
-            sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
-            return [WrongSign(sentence, ["pitch"], shown)]
+            return [
+                WrongSign.of(["pitch"], "falls where the wheels are driven harder at one speed", "nose up is")
+            ]
     fit = means.fit(thrust, moved)
     if fit.slope < 0 and np.nanmean(thrust) > 0:
         return []
@@ -324,9 +318,9 @@ def _thrust_warnings(means: Means, vehicle: Vehicle | None) -> list[str]:
 
 def _scale_sentence(scale: float, vehicle: Vehicle) -> str:
     if scale < 0:
-        shown = "fall where the vehicle is driven harder"
         names = [f"drive_torque_{wheel}" for wheel in vehicle.driven_radii]
-        return WrongSign(f"The drive torques {shown}: {_SIGN.format('each')}.", names, shown)
+        shown = "fall where the vehicle is driven harder"
+        return WrongSign.of(names, shown, "forward is", who="The drive torques")
     return (
         f"The drive torques over the wheel radius are {scale:.2g} times the force that moves {vehicle.mass:.4g} kg in this way: check the "
         "torques' unit and scale (at the wheel, not at the motor: the gear ratio counts), the wheel radius and the mass."

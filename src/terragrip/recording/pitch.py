@@ -45,13 +45,12 @@ def pitch_warnings(recording: Recording, means: Means, forward: Floats) -> list[
     observed = forward - means.change
     fit = means.fit(observed, means.climb)
     if fit.is_opposite:
-        shown = "falls where the accelerometer shows a climb"
-        sentence = f"pitch {shown}: nose up is positive; write 'sign: -1' for it in the profile."
+        note = WrongSign.of(["pitch"], "falls where the accelerometer shows a climb", "nose up is")
         moved = means.fit(forward, means.change, beside=means.climb)
         if moved.slope > _SURE * moved.error:
-            return [WrongSign(sentence, ["pitch"], shown)]
+            return [note]
         both = "pitch and acceleration_x show opposite climbs"
-        return [WrongSign(sentence, ["pitch", "acceleration_x"], both, sure=False)]
+        return [WrongSign(note, ["pitch", "acceleration_x"], both, sure=False)]
     roll = recording.channels.get("roll")
     if roll is not None and abs(fit.alike) < _ALIKE < abs(means.fit(observed, means.of(np.sin(roll))).alike):
         return [

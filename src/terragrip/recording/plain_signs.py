@@ -90,9 +90,7 @@ def _pull(recording: Recording) -> list[str]:
         odd, shown, rule = names, "falls where the drawbar force rises", "forward is"
     else:
         return []
-    each = "it" if len(odd) == 1 else "each"
-    sentence = f"{', '.join(odd)} {shown}: {rule} positive; write 'sign: -1' for {each} in the profile."
-    return [WrongSign(sentence, odd, shown)]
+    return [WrongSign.of(odd, shown, rule)]
 
 
 def _yaw(recording: Recording, pairs: list[tuple[str, str]]) -> list[str]:

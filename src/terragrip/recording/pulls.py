@@ -36,18 +36,11 @@ def pull_warnings(means: Means, recording: Recording, vehicle: Vehicle) -> list[
     together = means.fit(left + pull - moved, pull)
     if pulled < -PULL and together.slope < _SURE * together.error:  # else a trailer pushes downhill
         shown = f"is {pulled:.2g} of the weight on average"
-        sentence = (
-            f"drawbar_force {shown}: a backward pull is positive; write 'sign: -1' for it in the profile."
-        )
-        return [WrongSign(sentence, ["drawbar_force"], shown)]
+        return [WrongSign.of(["drawbar_force"], shown, "a backward pull is")]
     if rest < -PULL and -2 * thrust + rest > -PULL:  # turned, they leave a resistance
         shown = f"{thrust:.2g} of the weight on average, against a drawbar force of {pulled:.2g}"
         names = [f"drive_torque_{wheel}" for wheel in vehicle.driven_radii]
-        sentence = (
-            f"The drive torques over the wheel radius are {shown}: forward is positive: write 'sign: -1' for each in the "
-            "profile."
-        )
-        return [WrongSign(sentence, names, shown)]
+        return [WrongSign.of(names, shown, "forward is", who="The drive torques over the wheel radius are")]
     if rest < -PULL:
         shown = f"torques over the radius of {thrust:.2g} of the weight and a pull of {pulled:.2g}: the units of both?"
         sentence = (

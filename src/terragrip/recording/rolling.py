@@ -49,19 +49,20 @@ _ELSEWHERE = (
 
 def radius_warnings(recording: Recording, vehicle: Vehicle, means: Means) -> list[str]:
     """Much slip with hardly any torque, and none with much; beyond `RATIOS` `unit_warnings` names the unit that may be wrong."""
-    return light_warnings(recording, vehicle, means, _RADIUS) or _against_the_pull(recording, vehicle, means)
+    return _light(recording, vehicle, means, _RADIUS) or _against_the_pull(recording, vehicle, means)
 
 
-def light_warnings(
-    recording: Recording, vehicle: Vehicle, means: Means | None, least: float = _TYRE
-) -> list[str]:
+def light_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
+    """A sentence on wheels that slip where they hardly pull, by what is left where torques and radii are right."""
+    return [] if means is None else _light(recording, vehicle, means, _TYRE)
+
+
+def _light(recording: Recording, vehicle: Vehicle, means: Means, least: float) -> list[str]:
     """A sentence on rims that go faster than their hubs, straight ahead, where they hardly pull, or brake: by ``least`` of their speed more
     than the softest ground explains, or slower by `_RADIUS`, in the lightest windows of an axle, left and right together (exchanged torques
     oppose their slips).
 
     Torques that are too small look the same."""
-    if means is None:
-        return []
     radii, share = vehicle.driven_radii, vehicle.mass * STANDARD_GRAVITY / len(vehicle.wheels)
     straight = _straight(recording, vehicle, means)
     off: dict[str, float] = {}

@@ -236,9 +236,7 @@ def one_pulls(left: Floats, right: Floats) -> bool:
 def opposed_note(wheel: str) -> WrongSign:
     """The sentence on the wheel whose torque is of the opposite sign."""
     shown = "falls where that of the axle's other wheel rises, straight ahead"
-    name = f"drive_torque_{wheel}"
-    sentence = f"{name} {shown}: write 'sign: -1' for it in the profile, where forward is positive."
-    return WrongSign(sentence, [name], shown)
+    return WrongSign.of([f"drive_torque_{wheel}"], shown, "forward is")
 
 
 def _share(axle: Axle, pulls: Floats, straight: Bools) -> float | None:

@@ -31,15 +31,13 @@ def sideways_warnings(recording: Recording, means: Means | None, turn: Floats | 
     leaning = still if roll is None else STANDARD_GRAVITY * means.of(np.sin(roll))
     by_turns, by_roll = means.fit(felt, turning, beside=leaning), means.fit(felt, leaning, beside=turning)
     if by_turns.is_opposite:
-        shown = "falls in turns to the left"
-        sentence = f"acceleration_y {shown}: left is positive; write 'sign: -1' for it in the profile."
-        return [WrongSign(sentence, ["acceleration_y"], shown)]
+        return [WrongSign.of(["acceleration_y"], "falls in turns to the left", "left is")]
     if not by_roll.is_opposite:
         return []
     if by_turns.slope > _SURE * by_turns.error:
-        shown = "falls where acceleration_y shows the left side up"
-        sentence = f"roll {shown}: left side up is positive; write 'sign: -1' for it in the profile."
-        return [WrongSign(sentence, ["roll"], shown)]
+        return [
+            WrongSign.of(["roll"], "falls where acceleration_y shows the left side up", "left side up is")
+        ]
     both = "roll and acceleration_y lean to opposite sides"
     sentence = (
         f"{both}: left, and left side up, are positive; write 'sign: -1' for one of them in the profile."

@@ -73,10 +73,8 @@ def _scale_warnings(recording: Recording, vehicle: Vehicle, means: Means | None)
     left = rest - means.moved(recording)
     if mean < -_BRAKING and np.nanmean(left) < 0:  # else a slope, or a trailer, pushes
         shown = f"{mean:.2g} times the weight on average, while the vehicle drives forward"
-        sentence = (
-            f"The drive torques over the wheel radius are {shown}: write 'sign: -1' for each in the profile."
-        )
-        return [WrongSign(sentence, [f"drive_torque_{w}" for w in vehicle.driven_radii], shown)]
+        names = [f"drive_torque_{wheel}" for wheel in vehicle.driven_radii]
+        return [WrongSign.of(names, shown, "forward is", who="The drive torques over the wheel radius are")]
     most = quantile(np.abs(thrust[np.isfinite(thrust)]), 0.95) / STANDARD_GRAVITY if mean else 1.0
     if most < _LEAST:
         return [

@@ -19,3 +19,14 @@ class WrongSign(str):
         result = super().__new__(cls, sentence)
         result.channels, result.shown, result.sure = tuple(channels), shown, sure
         return result
+
+    @classmethod
+    def of(cls, channels: Iterable[str], shown: str, positive: str, *, who: str | None = None) -> Self:
+        """That ``channels`` are of the opposite sign, as what is ``positive`` shows; ``who``: what the sentence calls them."""
+        names = list(channels)
+        each = "it" if len(names) == 1 else "each"
+        return cls(
+            f"{who or ', '.join(names)} {shown}: {positive} positive; write 'sign: -1' for {each} in the profile.",
+            names,
+            shown,
+        )
