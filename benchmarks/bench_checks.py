@@ -17,11 +17,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import importlib
 import io
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +35,8 @@ from marked import put
 from terragrip.cli import main as terragrip
 from terragrip.errors import InputError
 from terragrip.formats import read
-from terragrip.recording import Recording, unit_warnings
+from terragrip.recording import Recording, once
+from terragrip.recording.plausibility import CHECKS, _Log
 from terragrip.simulation import families
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.vehicle import Vehicle
@@ -42,7 +46,7 @@ DOCUMENT = Path(__file__).resolve().parents[1] / "docs/checks.md"
 RATES = (None, 100.0, 20.0, 10.0)
 LIMITS = {
     "codes": "_FASTEST _SMALLEST _WEIGHTS _CODES _TIMES _BEYOND _MOST _SHORT _FEWEST _LEAP",
-    "pace": "_GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
+    "pace": "GRIP _OFTEN _OUTRUN _SPREAD _PART _DRIFT _CERTAIN _EVENLY _SHARED _COPY _DRIVEN",
     "frozen": "_TIMES _FINE _NOISY _CHANGED _COARSE _SEVERAL _CHANGES _GAINED _OFTEN _SECOND _RUN _RESOLVED _SHARE _LEAST _OFTENER _COMES",
     "turns": "SURE LEAST_TURN _CLEAR _SIZES _WIDE _OTHER _SURELY",
     "dropouts": "_BLINK _GOES_ON _SURE _FEWEST",
@@ -315,25 +319,95 @@ def with_mass(vehicle: Vehicle, factor: float) -> Vehicle:
     return Vehicle.from_dict(data)
 
 
+class Replay(_Log):
+    """A log whose checks are made again for a limit only where one reads it, or asks another one whose sentences changed."""
+
+    again: Callable[[Replay, str], bool] | None = None
+
+    def found(self, name: str) -> list[str]:
+        self.asked.add(name)
+        if self.again is not None and name not in self.seen:
+            self.seen.add(name)
+            if self.again(self, name):
+                del self._found[name]
+        return super().found(name)
+
+    def part(self, found: dict[str, list[str]]) -> Replay:
+        """The log with what is ``found`` in it, and nothing else made of it."""
+        once._MADE.clear()
+        result = copy.copy(self)
+        result._found, result.asked, result.seen = found, set(), set()
+        return result
+
+
+class Case:
+    """What the checks say of a log with the limits as they are, and which limits each of them reads."""
+
+    def __init__(self, log: Recording, vehicle: Vehicle) -> None:
+        self.log, self.vehicle = log, vehicle
+        self.plain, self.codes = reading(lambda: Replay(log, vehicle))
+        whole = self.plain.part({})
+        self.said = {check.name: whole.found(check.name) for check in CHECKS}
+        self.reads, self.asks = dict[str, set[str]](), dict[str, set[str]]()
+        for name in self.said:
+            one = self.plain.part({other: said for other, said in self.said.items() if other != name})
+            self.reads[name] = reading(lambda one=one, name=name: one.found(name))[1]
+            self.asks[name] = one.asked - {name}
+
+    def notes(self, limit: str | None = None) -> list[str]:
+        """What they say with another value of a ``limit``."""
+
+        def again(log: Replay, name: str) -> bool:
+            asked = (log.found(other) != self.said[other] for other in self.asks[name])
+            return limit in self.reads[name] or any(asked)
+
+        part = self.plain.part(dict(self.said))
+        part.again = again
+        if limit in self.codes and (other := Replay(self.log, self.vehicle)).codes != self.plain.codes:
+            part = other.part({})
+        return [note for check in CHECKS for note in part.found(check.name)]
+
+
+def reading(make: Callable[[], Any]) -> tuple[Any, set[str]]:
+    """What a function gives, and the limits, as module.NAME, that the code names which it runs."""
+    ran: set[tuple[str, Any]] = set()
+    sys.setprofile(lambda frame, *_: ran.add((frame.f_globals.get("__name__", ""), frame.f_code)))
+    try:
+        result = make()
+    finally:
+        sys.setprofile(None)
+    return result, {limit for home, code in ran for limit in limits_in(home, code)}
+
+
+@cache
+def limits_in(home: str, code: Any) -> frozenset[str]:
+    """The limits that a function's code names, its module's own and those that others lend it."""
+    own, names = home.rpartition(".")[2], set(code.co_names)
+    return frozenset(
+        f"{module}.{name}"
+        for module, listed in LIMITS.items()
+        for name in names & set(listed.split())
+        if module == own or name[0] != "_"
+    )
+
+
 def counts(
-    right: list[Log], real: list[Log], wrong: list[tuple[str, str, Recording, Vehicle]]
+    right: list[Case], real: list[Case], wrong: list[tuple[str, str, Case]], limit: str | None = None
 ) -> tuple[int, int, dict[str, int]]:
-    """False alarms on drives and on measured logs, and mistakes found, by name."""
+    """False alarms on drives and on measured logs, and mistakes found, by name, with another value of a ``limit``."""
     found = dict.fromkeys((name for name, *_ in wrong), 0)
-    for name, words, log, vehicle in wrong:
-        found[name] += any(words in note for note in unit_warnings(log, vehicle))
-    return *(sum(bool(unit_warnings(*log)) for log in logs) for logs in (right, real)), found  # type: ignore[return-value]
+    for name, words, case in wrong:
+        found[name] += any(words in note for note in case.notes(limit))
+    return *(sum(bool(case.notes(limit)) for case in cases) for cases in (right, real)), found  # type: ignore[return-value]
 
 
 @contextlib.contextmanager
 def at(module: str, name: str, value: float) -> Iterator[None]:
     """A limit with another value, also where its module lends it to others."""
-    homes = [importlib.import_module(f"terragrip.recording.{one}") for one in LIMITS]
-    homes = [
-        home
-        for home in homes
-        if home.__name__.endswith(f".{module}") or (name.isupper() and name[0] != "_" and hasattr(home, name))
-    ]
+    lent = name[0] != "_"
+    modules = [home for home in sys.modules if home.startswith("terragrip.recording.")]
+    homes = [sys.modules[home] for home in modules if home.endswith(f".{module}") or lent]
+    homes = [home for home in homes if hasattr(home, name)]
     usual = [getattr(home, name) for home in homes]
     for home in homes:
         setattr(home, name, value)
@@ -355,13 +429,14 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="these limits, as module.NAME")
     parser.add_argument("--write", action="store_true", help="put the table into docs/checks.md")
     arguments = parser.parse_args()
-    right, real = drives(arguments.machines), measured()
+    logs = drives(arguments.machines), measured()
     wrong = [
-        case
-        for k, log in enumerate([*right, *real])
-        for case in spoilt(*log)
-        if case[1] == UNSIGNED or (k % 3 == 0 and k < len(right))
+        (name, words, Case(*log))
+        for k, one in enumerate([*logs[0], *logs[1]])
+        for name, words, *log in spoilt(*one)
+        if words == UNSIGNED or (k % 3 == 0 and k < len(logs[0]))
     ]
+    right, real = ([Case(*log) for log in part] for part in logs)
     usual = counts(right, real, wrong)
     total = {name: sum(one == name for one, *_ in wrong) for name in usual[2]}
     head = ", ".join(f"{name} {usual[2][name]} of {total[name]}" for name in total)
@@ -381,7 +456,7 @@ def main() -> None:
             cells = [f"`{module}.{name}`", f"{value:g}"]
             for factor in (0.5, 2.0):
                 with at(module, name, moved(module, name, value, factor)):
-                    alarms, on_real, found = counts(right, real, wrong)
+                    alarms, on_real, found = counts(right, real, wrong, f"{module}.{name}")
                 change = [f"{n} {found[n] - usual[2][n]:+d}" for n in found if found[n] != usual[2][n]]
                 cells += [f"{alarms - usual[0]:+d}", f"{on_real - usual[1]:+d}", ", ".join(change) or "-"]
             lines.append("| " + " | ".join(cells) + " |")
