@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 import terragrip as tg
 from terragrip.errors import InputError
-from terragrip.formats import Profile, inspect
+from terragrip.formats import Profile, inspect, read
 from terragrip.formats.csv import csv_on_disk
 from terragrip.formats.log_blocks import recordings_of
 from terragrip.formats.stamps import Stamps
@@ -269,3 +270,25 @@ def test_only_a_logs_first_rows_tell_of_a_clock_that_was_set() -> None:
     for block in (dates[:0], dates, later):
         table = stamps.corrected(LogTable(("t",), {"t": block}))
         assert (len(table.columns["t"]), table.notes) == (len(block), ())
+
+
+@pytest.mark.parametrize(
+    "names", [("sec", "nsec"), ("header.stamp.secs", "header.stamp.nsecs"), ("stamp_sec", "stamp_nanosec")]
+)
+def test_seconds_and_nanoseconds_in_two_columns_are_one_time(tmp_path: Path, names: tuple[str, str]) -> None:
+    """The nanoseconds alone were proposed as time, surely, and 'estimate' then said that another log seemed to begin each second."""
+    time = np.arange(0, 30, 0.05)
+    speed = 1 + 0.3 * np.sin(time / 3)
+    stamps = np.round(1e9 * time).astype(np.int64) + 1_656_084_000_000_000_000
+    columns = dict(zip(names, (stamps // 1_000_000_000, stamps % 1_000_000_000), strict=True))
+    columns |= {"left_rpm": 60 * speed, "right_rpm": 61 * speed, "gps_speed_mps": speed}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    found = inspect(tmp_path / "log.csv")
+    assert f"time: {{from: {names[0]}, nanoseconds: {names[1]}, zero: first}}\n" in found.profile
+    profile = Profile.from_dict(yaml.safe_load(found.profile))
+    recording = read(tmp_path / "log.csv", profile)
+    np.testing.assert_allclose(recording.time, time, atol=1e-6)
+    assert recording.start == pytest.approx(1_656_084_000)
+    wrong = {**yaml.safe_load(found.profile), "time": {"from": names[0], "nanoseconds": "gone"}}
+    with pytest.raises(InputError, match=r"column gone.*is missing"):
+        read(tmp_path / "log.csv", Profile.from_dict(wrong))

@@ -26,7 +26,7 @@ from terragrip.formats.profile_parts import Rows, Source, matching, rate_unit
 from terragrip.formats.signals import SAME, union
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable
-from terragrip.formats.time_base import time_base
+from terragrip.formats.time_base import time_base, with_nanoseconds
 from terragrip.physics.geodesy import metres_of
 from terragrip.recording import Recording
 from terragrip.recording.checks import PLACES, refuse_place
@@ -74,6 +74,7 @@ def convert(profile: Profile, log: Any, source: str | None = None) -> Recording:
 def converted(profile: Profile, log: LogTable, *, partial: bool = False) -> Part:
     """The channels that ``profile`` makes of a log; where it is ``partial``, those that it can make of this one."""
     profile, notes = bound(profile, log, partial=partial)
+    log = with_nanoseconds(profile.time.column, profile.time.nanoseconds, log)
     log = Stamps(profile.time.column, profile.time.unit).corrected(log)
     wanted = asked(profile, log.columns)
     columns, repeats = merged({n: c for n, c in log.columns.items() if n in wanted}, profile.time.column)
@@ -131,7 +132,8 @@ def asked(profile: Profile, names: Iterable[str]) -> set[str]:
     """Which columns ``names`` of a log the profile may read."""
     rows = () if profile.rows is None else (profile.rows.column,)
     every = {c for origin in profile.channels.values() for one in origin.chain for c in one.columns}
-    return {name for c in (profile.time.column, *rows, *every) for name in matching(c, names)}
+    stamps = (profile.time.column, profile.time.nanoseconds or profile.time.column)
+    return {name for c in (*stamps, *rows, *every) for name in matching(c, names)}
 
 
 def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None:
@@ -147,6 +149,8 @@ def settled(profile: Profile, log: LogTable) -> tuple[Profile, list[str]] | None
         if sum(_ways(one, log.names) for one in origin.chain) > 1:
             return None
     if profile.rows is not None or profile.time.dates is not None or efforts(profile.channels):
+        return None
+    if profile.time.nanoseconds is not None:
         return None
     stub = np.zeros(1)
     return bound(profile, replace(log, columns=dict.fromkeys(log.names, stub)))

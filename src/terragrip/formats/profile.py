@@ -150,6 +150,7 @@ class Profile(Part):
             column for one in self.channels.values() for source in one.chain for column in source.columns
         }
         named |= {self.time.column, *([self.rows.column] if self.rows else [])}
+        named |= {self.time.nanoseconds} if self.time.nanoseconds else set()
         return frozenset(named | {bare for name in named for bare in names_and_units([name])[0]})
 
     def apply(self, log: Any, source: str | None = None) -> Recording:

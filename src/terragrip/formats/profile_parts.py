@@ -149,9 +149,13 @@ class Source(Part):
 
 
 class TimeSource(Part):
-    """The column of the stamps, its unit, whether time begins with 0 at the first row, and how dates are written."""
+    """The column of the stamps, its unit, whether time begins with 0 at the first row, and how dates are written.
+
+    ``nanoseconds``: the column of those beside whole seconds, as ROS writes its stamps.
+    """
 
     column: str = Field(TIME, alias="from")
+    nanoseconds: str | None = None
     unit: str = "s"
     zero: Literal["first"] | None = None
     dates: Literal["dd/mm/yyyy", "mm/dd/yyyy"] | None = None

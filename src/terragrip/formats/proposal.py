@@ -159,6 +159,7 @@ def profile_text(
     else:
         entry = {"from": stamp.name} | ({} if stamp.unit == "s" else {"unit": stamp.unit})
         entry |= {"dates": stamp.dates} if stamp.dates else {}
+        entry |= {"nanoseconds": stamp.nanoseconds} if stamp.nanoseconds else {}
         doubt = f"   # ? {stamp.doubt}" if stamp.doubt else ""
         lines.append(f"time: {_flow(entry | ({'zero': 'first'} if since_1970 else {}))}{doubt}")
     if dbc:

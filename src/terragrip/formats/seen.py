@@ -20,6 +20,7 @@ from terragrip.formats.signals import SignalLog
 from terragrip.formats.spoilt import numbers_of
 from terragrip.formats.stamps import Stamps
 from terragrip.formats.table import LogTable, Sparse
+from terragrip.formats.time_base import with_nanoseconds
 from terragrip.formats.time_column import TimeColumn, find_time
 from terragrip.formats.vocabulary import GENERAL, Vocabulary
 from terragrip.recording.columns import SINCE_1970
@@ -90,6 +91,7 @@ class Seen:
             problem = (doubt(texts[stamp.name]) or (0, "", ""))[1]
             stamp = stamp._replace(dates=orders[stamp.name], doubt=problem)
         if stamp is not None:
+            log = with_nanoseconds(stamp.name, stamp.nanoseconds, log)
             columns, repeats = merged(log.columns, stamp[0])
             log = Stamps(stamp.name, stamp.unit).corrected(replace(log, columns=columns))
         instants = None if stamp is None else _seconds(log.columns[stamp[0]], stamp[1])

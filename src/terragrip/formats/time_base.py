@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from terragrip.arrays import Floats
+from terragrip.errors import InputError
 from terragrip.formats.profile_parts import TimeSource
 from terragrip.formats.table import LogTable
 from terragrip.recording.columns import (
@@ -21,6 +23,17 @@ from terragrip.recording.columns import (
     start_of,
 )
 from terragrip.units import factor_to
+
+
+def with_nanoseconds(column: str, nanoseconds: str | None, log: LogTable) -> LogTable:
+    """A log whose stamps in ``column``, whole seconds, have the ``nanoseconds`` beside them added; raises InputError without these."""
+    if nanoseconds is None:
+        return log
+    if nanoseconds not in log.columns:
+        hint = "correct 'nanoseconds:' of the profile's time"
+        raise InputError("is missing", file=log.source, place=f"column {nanoseconds}", hint=hint)
+    whole, rest = (numbers(n, log.columns[n], None, log.source) for n in (column, nanoseconds))
+    return replace(log, columns={**log.columns, column: whole + 1e-9 * rest})
 
 
 def time_base(origin: TimeSource, log: LogTable) -> tuple[Floats, float | None, list[str]]:

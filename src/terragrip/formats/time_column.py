@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from terragrip.recording.columns import DATENUM, DATENUM_1970, DAY_STEP, SINCE_1
 from terragrip.recording.schema import TIME
 from terragrip.units import factor_to
 
+_NANOSECONDS = re.compile(r"(.*?)(?:n|nano)sec(?:s|onds?)?", re.IGNORECASE)
 _PLAUSIBLE = (1e-6, 3600.0)  # s between samples
 _FINER = ("s", "ms", "us", "ns")
 _DAYS = {  # days from, to, and the day that is 1970
@@ -27,12 +29,14 @@ _FIELD_RATE = 5.0  # s between samples: no log of a drive has more
 
 
 class TimeColumn(NamedTuple):
-    """The column that holds a log's time, its unit, what is doubtful about that, and the order of its dates where they do not show it."""
+    """The column that holds a log's time, its unit, what is doubtful about that, the order of its dates where they do not show it, and
+    the column of the nanoseconds beside whole seconds."""
 
     name: str
     unit: str
     doubt: str = ""
     dates: str = ""
+    nanoseconds: str | None = None
 
 
 def find_time(
@@ -47,11 +51,14 @@ def find_time(
     calendar's zero comes first, then the one that stands first.
     """
     best: tuple[float, TimeColumn, bool] | None = None
+    parts = _parts(numbers)
     for column, values in numbers.items():
+        if column in parts.values():
+            continue
         score, unit, doubt = _score(column, values, units.get(column), vocabulary)
         if score > 0 and (best is None or score > best[0]):
             size = float(np.nanmax(np.abs(values), initial=0.0)) * factor_to(unit, "s")
-            own = TimeColumn(column, unit, doubt)
+            own = TimeColumn(column, unit, doubt, nanoseconds=parts.get(column))
             best = score, own, size > SINCE_1970 and bool(np.isfinite(values).all())
     # A date says when it was; a number that counts from 1970 does too.
     if best is not None and (not dates or (best[1].name == TIME and best[0] > 5) or best[2]):
@@ -73,6 +80,24 @@ def other_clocks(numbers: Mapping[str, Floats], time: str, units: Mapping[str, s
                 f"them a profile of their own with 'time: {{from: {column}}}', and the log once more by --with."
             )
     return notes
+
+
+def _parts(numbers: Mapping[str, Floats]) -> dict[str, str]:
+    """Columns of whole seconds with the columns of the nanoseconds that belong to them: stamp.secs and stamp.nsecs, sec and nanosec."""
+    result = {}
+    for name, values in numbers.items():
+        match = _NANOSECONDS.fullmatch(name)
+        if match is None or not (
+            np.nanmin(values, initial=0) >= 0 and 1e6 < np.nanmax(values, initial=0) <= 1e9
+        ):
+            continue
+        whole = next(
+            (n for n in numbers if n.lower() in (f"{match[1]}sec{s}".lower() for s in ("", "s", "onds"))),
+            None,
+        )
+        if whole is not None and np.all(numbers[whole] == np.round(numbers[whole])):
+            result[whole] = name
+    return result
 
 
 def _score(column: str, values: Floats, stated: str | None, vocabulary: Vocabulary) -> tuple[float, str, str]:
