@@ -67,9 +67,14 @@ def settings_in(
     whose error is added to them. ``held``: None finds the periods.
     """
     from terragrip.recording import held_periods
+    from terragrip.recording.ground_noise import understated_noise
 
     periods = dict(held_periods(recording) if held is None else held)
     logged = rounded_noise(recording, vehicle) | logged_noise(recording, vehicle, periods)
+    # Slip's interval rests on this one: with a fourth of the true SD it holds slip in 75 % of the rows, where that of any other sensor, as
+    # wrong, leaves 96 % (development machines).
+    if (more := understated_noise(recording, vehicle)) is not None:
+        logged["ground_speed"] = more
     given = sensors or {}
     return {n: sd for n, sd in logged.items() if n not in given and sensor_of(n) not in given}, periods
 

@@ -49,14 +49,14 @@ def sensor_noise(recording: Recording, held: dict[str, float] | None = None) -> 
     return outcome
 
 
-def white_noise(time: Floats, values: Floats) -> float | None:
+def white_noise(time: Floats, values: Floats, motion: Floats | None = None) -> float | None:
     """Robust standard deviation of the white noise on a smooth signal (n,); None if it cannot be determined.
 
     The third divided difference Σ c_j x_j, c_j = Π 1/(t_j - t_i), of four samples does not respond to any motion
     that is quadratic over them. Over √Σc² it has the noise's variance, and its median absolute value
     is robust against spikes. Four samples that are all equal (standstill) or straddle a gap do not count. The
     result is never under q/√12 for a resolution q, nor under 1e-4 of the signal's size. Noise with
-    memory (a filtered channel) is underestimated.
+    memory (a filtered channel) is underestimated. ``motion`` (n,), known from elsewhere, is no noise, however fast it is.
     """
     if len(values) < _FEWEST:
         return None
@@ -71,7 +71,8 @@ def white_noise(time: Floats, values: Floats) -> float | None:
     a, b, c, d = (time[first + k] for k in range(4))
     ab, ac, ad, bc, bd, cd = a - b, a - c, a - d, b - c, b - d, c - d
     weights = [1.0 / (ab * ac * ad), -1.0 / (ab * bc * bd), 1.0 / (ac * bc * cd), -1.0 / (ad * bd * cd)]
-    third = sum(weight * values[first + k] for k, weight in enumerate(weights)) / np.sqrt(
+    what = values if motion is None else values - motion
+    third = sum(weight * what[first + k] for k, weight in enumerate(weights)) / np.sqrt(
         sum(w**2 for w in weights)
     )
     scale = MAD_TO_SD * median(np.abs(third))

@@ -24,6 +24,7 @@ from terragrip.recording.doubled import doubled_warnings
 from terragrip.recording.dropouts import dropout_warnings, zero_warnings
 from terragrip.recording.forces import Courses, acceleration_warnings, balance_warnings
 from terragrip.recording.frozen import cut_warnings, frozen_warnings, overflow_warnings
+from terragrip.recording.ground_noise import noisy_ground_speed_warnings
 from terragrip.recording.held import measurable
 from terragrip.recording.inertial import inertial_warnings
 from terragrip.recording.interpolated import interpolated_warnings
@@ -281,6 +282,11 @@ _EACH = (
     Check("copied torques", lambda log: torque_copy_warnings(log.whole, log.vehicle), _WAY),
     Check("copied speeds", lambda log: speed_copy_warnings(log.whole, log.vehicle), _WAY),
     Check("torques", lambda log: torque_warnings(log.rows, log.vehicle, log.means), _FORCES),
+    Check(
+        "ground noise",
+        lambda log: noisy_ground_speed_warnings(log.whole, log.vehicle),
+        (*_WAY, "rims", "frozen", "interpolated"),
+    ),
     Check(
         "rim noise",
         lambda log: noisy_rim_warnings(log.whole, log.vehicle),
