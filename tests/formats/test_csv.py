@@ -718,3 +718,18 @@ def test_marks_of_missing_values_may_have_a_blank_before_them(tmp_path: Path) ->
     rows = "".join(f"{0.1 * k:.1f}, {'-' if k < 3 else k}, {'NaN' if k == 5 else 2}\n" for k in range(20))
     table = read_table(put(tmp_path, "time, n_l, n_r\n" + rows)).columns
     assert (np.isnan(table["n_l"]).sum(), np.isnan(table["n_r"]).sum()) == (3, 1)
+
+
+def test_rows_of_several_kinds_are_refused_by_their_names(tmp_path: Path) -> None:
+    """A script's export of a robot's messages: its first row was taken for the header, and 'has no wheel speed' was all that was said."""
+    rows = []
+    for k in range(40):
+        stamp = f"2024:06:01 14:23:{k:02d}.490188"
+        rows += [f"Odometry;{stamp};Position;{k};2.5;DeltaPosition;0.1", f"IMU;{stamp};Rate;0.1"]
+        rows += [f"GPS;{stamp};51.98;5.66;4"] * (k % 2)
+    with pytest.raises(
+        InputError, match=r"rows of several kinds \(GPS, IMU, Odometry\), each with columns of its own"
+    ):
+        read_table(put(tmp_path, "\n".join(rows) + "\n"))
+    labels = "".join(f"{'sand' if k % 3 else 'clay'},{k / 10},1.5\n" for k in range(40))
+    assert list(read_table(put(tmp_path, "soil,time,v\n" + labels)).columns) == ["soil", "time", "v"]

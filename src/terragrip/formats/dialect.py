@@ -105,6 +105,23 @@ def _require_table(lines: list[str], source: str) -> None:
     if lines[0].lstrip().startswith(("{", "[{")):
         hint = "save it as CSV or Parquet, e.g. by pandas.read_json(FILE, lines=True).to_parquet(...) if each line is an object"
         raise InputError("is JSON", file=source, hint=hint)
+    if kinds := _kinds(lines):
+        hint = "make a table of each kind, with a header of names and one column of time, and join them by --with"
+        problem = f"has rows of several kinds ({', '.join(kinds)}), each with columns of its own"
+        raise InputError(problem, file=source, hint=hint)
+
+
+def _kinds(lines: list[str]) -> list[str]:
+    """The first cells of records of several kinds: a few words, each with rows of one width, not all of the same; empty of a table."""
+    for separator in _SEPARATORS:
+        widths: dict[str, list[int]] = {}
+        for line in lines:
+            cells = split(line, separator)
+            widths.setdefault(cells[0], []).append(len(cells))
+        of_one_width = all(len(own) > 1 and len(set(own)) == 1 and own[0] > 1 for own in widths.values())
+        if of_one_width and len({own[0] for own in widths.values()}) > 1 and all(map(_NAME.match, widths)):
+            return sorted(widths)
+    return []
 
 
 def _header_rows(table: list[list[str]], decimal: str) -> int:
