@@ -126,6 +126,7 @@ PAGES = (
 
 _CONTRADICTED = ("checks#", "formats#in-a-profile")
 _NO_FAULT = "Columns that are not used"
+_OF_SCALE = ("checks#units-scales", "checks#signs", "formats#in-a-profile")
 _SHOWN = 5  # runs
 
 
@@ -150,6 +151,11 @@ def doubts_of(runs: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
     more = len(found) - _SHOWN
     words = f"{more} more run{'s have' if more > 1 else ' has'} such notes; 'terragrip report' shows them."
     return found[:_SHOWN] + [words] * (more > 0)
+
+
+def is_of_scale(note: str) -> bool:
+    """Whether a note is on a unit, a scale, a zero or a sign: estimates that cannot be follow from it."""
+    return (_page(note) or "").startswith(_OF_SCALE) and not note.startswith(_NO_FAULT)
 
 
 def _page(note: str) -> str | None:

@@ -333,6 +333,14 @@ def test_a_ground_that_would_push_is_named(wrong: str) -> None:
     assert [named in part.notes for part in parts] == [False] * (len(parts) - 1) + [True]
 
 
+def test_a_ground_that_would_push_by_a_sign_that_is_named_is_not() -> None:
+    """Torques of the opposite sign were named, and then that soil resistance is below 0."""
+    right = robot(rate=20.0)
+    wrong = {n: -v if n.startswith("drive_torque_") else v for n, v in right.recording.channels.items()}
+    (named,) = estimate(replace(right.recording, channels=wrong), right.vehicle).notes
+    assert "write 'sign: -1'" in named
+
+
 def test_a_ground_that_pushes_throughout_is_named_though_each_row_says_push() -> None:
     """Torques x .7: soil resistance -.024 ± .005 for .08, the event push in two thirds of the rows, and those were not counted."""
     log = drives.drive(60.0, rate=50.0, imu=True).recording

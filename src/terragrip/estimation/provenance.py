@@ -13,6 +13,7 @@ import numpy as np
 from terragrip.errors import InputError
 from terragrip.estimation.consistency import NORMAL_95
 from terragrip.estimation.methods import SLIP_ONLY
+from terragrip.note_pages import is_of_scale
 from terragrip.recording import unit_warnings
 from terragrip.recording.brake import braked
 from terragrip.recording.checks import NOTHING_TOWED
@@ -124,7 +125,7 @@ def notes_of(estimator: TractionEstimator, recording: Recording) -> tuple[str, .
 
 def with_push_note(parts: Iterator[Estimates]) -> Iterator[Estimates]:
     """The parts of a log's estimates, the last with a sentence where the intervals of soil resistance are below 0 too often: no ground
-    pushes a vehicle."""
+    pushes a vehicle. None where a unit, a scale or a sign is named already, from which that follows."""
     below = rows = 0
     last: Estimates | None = None
     for part in parts:
@@ -142,4 +143,5 @@ def with_push_note(parts: Iterator[Estimates]) -> Iterator[Estimates]:
             "zero, what a driver subtracts for friction), drawbar_force, mass and tire_rolling_resistance; a slope downhill, or another "
             "machine that pushes, does this, too, where nothing measures it."
         )
-        yield replace(last, notes=(*last.notes, note)) if below >= max(_FEWEST, _PUSHED * rows) else last
+        is_new = below >= max(_FEWEST, _PUSHED * rows) and not any(map(is_of_scale, last.notes))
+        yield replace(last, notes=(*last.notes, note)) if is_new else last

@@ -18,7 +18,7 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.mechanics import Means
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled_channel, straight_rows
+from terragrip.recording.turns import are_known, filled_channel, straight_rows
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def free_axle_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 def _rolled(recording: Recording, axle: Axle, speed: Floats, rows: Bools) -> Floats | None:
     """An axle's rate of turn over the ground speed [1/m]: quartiles (3,) of ``rows`` (n,); None where one of its wheels is not measured."""
     names = [f"wheel_speed_{wheel}" for wheel in axle.wheels]
-    if not all(np.isfinite(recording.channels.get(name, np.nan)).any() for name in names):
+    if not are_known(recording, *names):
         return None
     rate = np.abs(np.mean([filled_channel(recording, name) for name in names], axis=0))
     used = rows & (rate > 0)

@@ -17,7 +17,7 @@ from terragrip.arrays import Floats
 from terragrip.recording.brake import braked
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import quantile
-from terragrip.recording.turns import filled_channel
+from terragrip.recording.turns import are_known, filled_channel
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
@@ -84,7 +84,7 @@ class Courses:
             if vehicle is None
             else [f"wheel_speed_{w}" for w in vehicle.driven_radii]
         )
-        if found is None or not names or not _known(recording, "ground_speed", *names):
+        if found is None or not names or not are_known(recording, "ground_speed", *names):
             return None
         points, step = found
         if 2 * step > _CALM:
@@ -116,14 +116,14 @@ class Courses:
 
         rate = np.gradient(rim, step)
         change = np.gradient(speed, step)
-        if _known(recording, "pitch"):
+        if are_known(recording, "pitch"):
             change = change + STANDARD_GRAVITY * np.sin(calm(at("pitch")))
         shown = None
-        if _known(recording, "acceleration_x") and not _is_dead(channels["acceleration_x"]):
+        if are_known(recording, "acceleration_x") and not _is_dead(channels["acceleration_x"]):
             shown = quick(calm(at("acceleration_x")))
         thrust = pull = beside = None
         torques = [f"drive_torque_{w}" for w in radii]
-        if vehicle is not None and torques and _known(recording, *torques):
+        if vehicle is not None and torques and are_known(recording, *torques):
             spun = sum(
                 float(inertia) / radius**2 * on
                 for inertia, radius, on in zip(
@@ -132,7 +132,7 @@ class Courses:
             )
             force = calm(np.sum([at(f"drive_torque_{w}") / r for w, r in radii.items()], axis=0))
             thrust = quick((force - spun * rate) / vehicle.mass)
-            if _known(recording, "drawbar_force"):
+            if are_known(recording, "drawbar_force"):
                 apart = _CALM + 2 * step  # such means share no sample
                 pull = quick(calm(at("drawbar_force")) / vehicle.mass)
                 near = at("drawbar_force", -apart) + at("drawbar_force", apart)
@@ -237,10 +237,6 @@ def _imbalance(mass: Range, beside: str, causes: list[str], vehicle: Vehicle) ->
         f"In starts and stops the drive torques over the wheel radius change by {mass.value:.2g} times the force that moves "
         f"{vehicle.mass:.4g} kg{beside}: check {', or '.join(causes)}."
     )
-
-
-def _known(recording: Recording, *names: str) -> bool:
-    return all(np.isfinite(recording.channels.get(name, np.nan)).sum() > 1 for name in names)
 
 
 def _correlation(a: Floats, b: Floats) -> float:

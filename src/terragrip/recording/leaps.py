@@ -20,7 +20,7 @@ from terragrip.recording.pulls import PULL
 from terragrip.recording.ranks import median, quantile
 from terragrip.recording.schema import unit_of
 from terragrip.recording.stretches import DRIVING, LONG, gaps
-from terragrip.recording.turns import filled, filled_channel
+from terragrip.recording.turns import are_known, filled, filled_channel
 from terragrip.units import STANDARD_GRAVITY
 from terragrip.written_times import moment
 
@@ -84,9 +84,7 @@ def leap_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
 def _slip(recording: Recording, drive: _Drive, radii: dict[str, float]) -> Floats:
     """The driven wheels' mean slip (n,), as far as rims and ground speed show it; 0 where a rim is in no channel."""
     names = [f"wheel_speed_{wheel}" for wheel in radii]
-    if not all(
-        name in recording.channels and np.isfinite(recording.channels[name]).sum() > 1 for name in names
-    ):
+    if not are_known(recording, *names):
         return np.zeros(len(recording))
     rims = [filled_channel(recording, n) * r for n, r in zip(names, radii.values(), strict=True)]
     rim = np.mean(rims, axis=0)

@@ -160,8 +160,9 @@ def motion_warnings(recording: Recording, vehicle: Vehicle | None, means: Means 
     if vehicle is not None and vehicle.knows_wheels:
         notes = _dead_warnings(recording, vehicle)
         notes += radius_warnings(recording, vehicle, means)
+        notes = notes or pull_warnings(means, recording, vehicle)
         means = replace(means, thrusts={}) if notes else means
-        notes += pull_warnings(means, recording, vehicle) or silent_cell(recording, vehicle)
+        notes += silent_cell(recording, vehicle)
     if forward is not None:
         found = _balance_warnings(recording, means, forward, vehicle)
         found = found or zero_warnings(means, forward)

@@ -183,6 +183,7 @@ _FORCES = (
     *_INSTANTS,
     "rims",
     "angles",
+    "spacing",
     "signs",
     "uneven torques",
     "motion",
@@ -290,7 +291,7 @@ _EACH = (
     Check(
         "rim noise",
         lambda log: noisy_rim_warnings(log.whole, log.vehicle),
-        (*_TIME, "counted", "rims", "sides", "frozen"),
+        (*_TIME, "counted", "rims", "sides", "rescaled", "frozen"),
     ),
     Check(
         "balance",

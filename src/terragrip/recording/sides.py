@@ -14,7 +14,15 @@ import numpy as np
 from terragrip.arrays import Bools, Floats
 from terragrip.recording.once import once
 from terragrip.recording.ranks import quantile
-from terragrip.recording.turns import LEAST_TURN, WINDOW, filled, filled_channel, windows
+from terragrip.recording.turns import (
+    LEAST_TURN,
+    WINDOW,
+    are_known,
+    filled,
+    filled_channel,
+    rim_speed,
+    windows,
+)
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
 
@@ -149,18 +157,16 @@ class Drive:
 @once
 def _axles(recording: Recording, vehicle: Vehicle, turn: Floats) -> tuple[list[Axle], Floats, Floats]:
     """Axles of two sides with both speeds known, time, and the turn, as means over the windows that have them all."""
-    radius, channels = vehicle.radii, recording.channels
+    radius = vehicle.radii
     rows: list[Floats] = [recording.time, turn]
     found: list[tuple[str, tuple[str, str], float, int, bool]] = []
     for name, axle in vehicle.axles.items():
         sides = (axle.wheels[0], axle.wheels[-1])
-        if len(axle.wheels) < 2 or not all(
-            np.isfinite(channels.get(f"wheel_speed_{w}", np.nan)).any() for w in sides
-        ):
+        if len(axle.wheels) < 2 or not are_known(recording, *(f"wheel_speed_{w}" for w in sides)):
             continue
-        powered = all(np.isfinite(channels.get(f"drive_torque_{w}", np.nan)).any() for w in sides)
+        powered = are_known(recording, *(f"drive_torque_{w}" for w in sides))
         found.append((name, sides, axle.mass * STANDARD_GRAVITY, len(rows), powered))
-        rows += [radius[w] * filled_channel(recording, f"wheel_speed_{w}") for w in sides]
+        rows += [rim_speed(recording, vehicle, w) for w in sides]
         rows += [filled_channel(recording, f"drive_torque_{w}") / radius[w] for w in sides] if powered else []
     means = windows(recording.time, np.array(rows))
     axles = [

@@ -13,7 +13,7 @@ import numpy as np
 
 from terragrip.recording.courses import points_of, smooth
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled_channel
+from terragrip.recording.turns import are_known, filled_channel
 from terragrip.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def slowing_warnings(recording: Recording, vehicle: Vehicle) -> list[str]:
     )
     found = points_of(recording.time)
     slope_known = "acceleration_x" in channels or "pitch" in channels
-    known = all(np.isfinite(channels.get(n, np.nan)).sum() > 1 for n in ("ground_speed", *torques, *rims))
+    known = are_known(recording, "ground_speed", *torques, *rims)
     if (
         "brake" in channels
         or found is None

@@ -12,7 +12,7 @@ import numpy as np
 
 from terragrip.arrays import Floats
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import SURE, filled_channel, side_differences, windows
+from terragrip.recording.turns import SURE, filled_channel, rim_speed, side_differences, windows
 
 if TYPE_CHECKING:
     from terragrip.recording.table import Recording
@@ -35,7 +35,7 @@ def steering_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | Non
     if turn is None or states or not needed <= recording.channels.keys():
         return []
     ground = filled_channel(recording, "ground_speed")
-    rims = [np.mean([_rim(recording, vehicle, w) for w in axle.wheels], axis=0) for _, axle in axles]
+    rims = [np.mean([rim_speed(recording, vehicle, w) for w in axle.wheels], axis=0) for _, axle in axles]
     *rims, ground, rate = windows(recording.time, np.array([*rims, ground, turn]))
     if not len(rate):
         return []
@@ -68,7 +68,7 @@ def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) 
         or not {f"wheel_speed_{w}" for w in wheels} <= recording.channels.keys()
     ):
         return []
-    rims = {w: _rim(recording, vehicle, w) for w in wheels}
+    rims = {w: rim_speed(recording, vehicle, w) for w in wheels}
     sides = side_differences(vehicle, rims)
     if len(sides) < 2:
         return []
@@ -87,8 +87,3 @@ def joint_warnings(recording: Recording, vehicle: Vehicle, turn: Floats | None) 
         f"In {np.mean(bends):.0%} of the driving the joint bends: front and rear then turn by different rates, of which the log has one, "
         f"and slips of the other's wheels are off by up to {quantile(off, 0.95):.2f}, which their intervals hold."
     ]
-
-
-def _rim(recording: Recording, vehicle: Vehicle, wheel: str) -> Floats:
-    """Rim speed (n,) [m/s]."""
-    return vehicle.radii[wheel] * filled_channel(recording, f"wheel_speed_{wheel}")

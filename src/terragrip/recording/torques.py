@@ -20,7 +20,7 @@ from terragrip.arrays import Floats, Ints
 from terragrip.recording.courses import CALM, lag_of, points_of, quick, smooth
 from terragrip.recording.mechanics import Fit, Means
 from terragrip.recording.ranks import median, quantile
-from terragrip.recording.turns import filled, filled_channel
+from terragrip.recording.turns import are_known, filled, filled_channel
 from terragrip.recording.window_means import window_means, windows_of
 from terragrip.recording.wrong_sign import WrongSign
 from terragrip.units import STANDARD_GRAVITY
@@ -105,9 +105,9 @@ def _pull_scale(fit: Fit) -> list[str]:
 def _courses(recording: Recording, vehicle: Vehicle) -> tuple[Floats, Floats, float] | None:
     """Quick changes of the thrust, and of the pull plus the rims' accelerating force, over the mass (n,) [m/s²], 0 where the vehicle hardly
     moves, and the distance [s] of their points; None where a torque or a wheel speed is missing, or the log is short."""
-    radii, channels, time = vehicle.driven_radii, recording.channels, recording.time
+    radii, time = vehicle.driven_radii, recording.time
     names = [f"{quantity}_{w}" for w in radii for quantity in ("drive_torque", "wheel_speed")]
-    if not radii or not all(np.isfinite(channels.get(name, np.nan)).sum() > 1 for name in names):
+    if not radii or not are_known(recording, *names):
         return None
     found = points_of(time)
     if found is None:
@@ -124,7 +124,7 @@ def _courses(recording: Recording, vehicle: Vehicle) -> tuple[Floats, Floats, fl
     thrust = at(np.sum(thrusts, axis=0)) / vehicle.mass
     rim = at(np.mean([radius * known(f"wheel_speed_{w}") for w, radius in radii.items()], axis=0))
     force = np.gradient(smooth(rim, CALM, step), step)
-    if np.isfinite(channels.get("drawbar_force", np.nan)).sum() > 1:
+    if are_known(recording, "drawbar_force"):
         force = force + at(known("drawbar_force")) / vehicle.mass
     moving = rim > _MOVING * quantile(rim, 0.95)
     return np.where(moving, quick(thrust, step), 0.0), np.where(moving, quick(force, step), 0.0), step

@@ -17,6 +17,7 @@ from terragrip.recording.turns import (
     WINDOW,
     agreement,
     filled_channel,
+    rim_speed,
     side_differences,
     windows,
 )
@@ -94,7 +95,7 @@ def _is_dead(recording: Recording, yaw: Floats, vehicle: Vehicle) -> bool:
     if len(shown) < 3 or np.ptp(shown) or not vehicle.knows_wheels:
         return False
     known = [w for w in vehicle.wheels if f"wheel_speed_{w}" in recording.channels]
-    rims = [vehicle.radii[w] * np.abs(filled_channel(recording, f"wheel_speed_{w}")) for w in known]
+    rims = [np.abs(rim_speed(recording, vehicle, w)) for w in known]
     if not rims:
         return False
     apart, pace = windows(

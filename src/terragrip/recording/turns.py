@@ -56,6 +56,16 @@ def filled_channel(recording: Recording, name: str) -> Floats:
     return filled(recording.time, recording.channels[name])
 
 
+def are_known(recording: Recording, *names: str) -> bool:
+    """Whether each of these channels has two values or more."""
+    return all(np.isfinite(recording.channels.get(name, np.nan)).sum() > 1 for name in names)
+
+
+def rim_speed(recording: Recording, vehicle: Vehicle, wheel: str) -> Floats:
+    """A wheel's speed at its rim (n,) [m/s]."""
+    return vehicle.radii[wheel] * filled_channel(recording, f"wheel_speed_{wheel}")
+
+
 def side_differences(vehicle: Vehicle, rims: Mapping[str, Floats]) -> list[Floats]:
     """Of each axle whose outer wheels are both among ``rims`` (n,), the right one's less the left one's."""
     outer = [(axle.wheels[0], axle.wheels[-1]) for axle in vehicle.axles.values() if len(axle.wheels) > 1]
@@ -97,7 +107,7 @@ def straight_rows(recording: Recording, vehicle: Vehicle) -> Bools:
     side = dict(zip(vehicle.wheels, vehicle.wheel_side.tolist(), strict=True))
     for axle in vehicle.axles.values():
         known = [w for w in (axle.wheels[0], axle.wheels[-1]) if f"wheel_speed_{w}" in recording.channels]
-        rims = [vehicle.radii[w] * filled_channel(recording, f"wheel_speed_{w}") for w in known]
+        rims = [rim_speed(recording, vehicle, w) for w in known]
         if len(axle.wheels) > 1 and len(rims) == 2:
             track = abs(side[axle.wheels[0]] - side[axle.wheels[-1]])
             slant = min(_SLANT, _TURNED * track / (2 * ahead)) if ahead * track > 0 else _SLANT
