@@ -29,6 +29,7 @@ KEYS: dict[type[BaseModel], dict[str, str]] = {
         "from": "the column of the stamps",
         "unit": "of the stamps: s, ms, us, ns",
         "zero": "`first`: time begins with 0 at the first row",
+        "nanoseconds": "the column of the nanoseconds, where the stamps are whole seconds beside them, as ROS writes them",
         "dates": "`dd/mm/yyyy` or `mm/dd/yyyy`: the order in dates as 3/4/2024, where no day above 12 shows it",
     },
     Rows: {"column": "the column that decides", "equals": "the value that it must have"},
