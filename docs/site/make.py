@@ -75,6 +75,7 @@ CONTENTS: dict[str, list[str]] = {
         "maps-history",
         "advice-history",
         "warning",
+        "warning-history",
         "real-logs",
         "benchmarks",
     ],
