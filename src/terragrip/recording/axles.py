@@ -32,6 +32,7 @@ _STRAIGHT = 0.05  # of an axle's rims from side to side
 _SLIP = 0.02  # less is of the size of the errors of the radii, which are a like share of the slip, and so of the adhesion;
 _RADII = 0.01  # where the vehicle file states none
 _UNEVEN = 0.25  # logarithm of 1.28: uncalibrated torques and the rear wheels' trodden track
+_SURE = 2.0  # standard deviations of a torque's gain
 _RESTORED = 0.4  # of the difference, at most, is left when what was exchanged is put right
 _MOVING, _ROWS = 0.3, 100  # of the speed that a twentieth of the drive exceeds, in so many rows
 _FASTER = 0.02  # logarithm of free rims over driven ones: of two radii known to 1 %. (101 right logs of development: at most -.009)
@@ -41,7 +42,7 @@ _ALIKE = 0.06  # the same, where another column is to be the right one
 
 
 def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -> list[str]:
-    """A sentence on two driven axles whose thrusts, by their slips, would fit each other's masses.
+    """A sentence on two driven axles whose thrusts, by their slips, would fit each other's masses, else on two that do not fit theirs.
 
     Other errors of torques and speeds look the same: use this only where no other was found.
     """
@@ -61,13 +62,14 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
         return []
     pulls = _pulls(recording, vehicle, means, total)
 
-    stated = vehicle.uncertainty.wheel_radius
+    stated, gain = vehicle.uncertainty.wheel_radius, vehicle.uncertainty.drive_torque_gain or 0.0
     radii = _RADII if stated is None else np.sqrt(2) * stated  # of two axles' radii, each by itself
 
     def beyond(forces: dict[int, Floats], masses: Floats, slope: float, pair: tuple[int, int]) -> list[float]:
         of = [_difference(forces, vehicle, masses, means, pull, rows, pair) for pull in pulls]
         return [_beyond(one, slope) for one in of]
 
+    uneven_loads: list[str] = []
     for a, b in combinations(driven, 2):
         slips = [median(slip[k][rows]) for k in (a, b)]
         if min(slips) < _SLIP:
@@ -86,13 +88,15 @@ def axle_warnings(recording: Recording, vehicle: Vehicle, means: Means | None) -
             "the axle of each wheel": beyond(moved, vehicle.axle_mass, -steepest, (a, b)),
         }
         likely = [what for what, left in causes.items() if min(map(abs, left)) < _RESTORED * abs(least)]
+        strong, weak = (names[a], names[b]) if least > 0 else (names[b], names[a])
+        note = f"The axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as its slip and that of {weak} allow"
         if likely:
-            strong, weak = (names[a], names[b]) if least > 0 else (names[b], names[a])
-            return [
-                f"The axle {strong} pulls {np.exp(abs(least)):.2g} times as much for its load as its slip and that of {weak} allow, and "
-                f"with the two exchanged it would not: check {', or '.join(likely)}."
-            ]
-    return []
+            return [f"{note}, and with the two exchanged it would not: check {', or '.join(likely)}."]
+        if abs(least) > uneven + _SURE * gain:
+            uneven_loads.append(
+                f"{note}: check the masses of the axles (ballast and mounted tools shift them) and the scales of their torques."
+            )
+    return uneven_loads[:1]
 
 
 def _beyond(difference: float, steepest: float) -> float:
