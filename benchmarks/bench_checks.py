@@ -62,6 +62,8 @@ LIMITS = {
     "plain_units": "_ON_TIME _EMPTY",
     "sides": "_APART _SPUN",
     "rolling": "_LIGHT _RADIUS _TYRE _LIGHTEST _PULLING _MOST _RADII_SURE _SLOWER_LEAST _SURE _TURNING",
+    "ground_noise": "_TWICE",
+    "axles": "_LEAST _PULLING _STRAIGHT _SLIP _RADII _UNEVEN _SURE _RESTORED",
     "turn_rates": "_ALIKE _SCRUBBED _STEERED _MOST",
 }
 SHARES = {
@@ -293,6 +295,10 @@ def spoilt(log: Recording, vehicle: Vehicle) -> Iterator[tuple[str, str, Recordi
         balance = "In starts and stops"
         yield "torques 1.5 times", balance, changed(log, "drive_torque", by=lambda v: 1.5 * v), vehicle
         yield "mass 1.6 times", balance, log, with_mass(vehicle, 1.6)
+    if vehicle.sensors.ground_speed:
+        yield "noise of a data sheet", "ground_speed: noise of", log, with_noise(vehicle, 0.25)
+    if sum(axle.driven for axle in vehicle.axles.values()) > 1:
+        yield "ballast", "check the masses of the axles", log, with_ballast(vehicle, 0.4)
     if vehicle.track:
         yield (
             "track doubled",
@@ -316,6 +322,23 @@ def with_mass(vehicle: Vehicle, factor: float) -> Vehicle:
     data = vehicle.to_dict()
     for part in (data, *data["axles"].values()):
         part["mass"] *= factor
+    return Vehicle.from_dict(data)
+
+
+def with_noise(vehicle: Vehicle, factor: float) -> Vehicle:
+    """The vehicle with the ground speed's stated noise times a factor."""
+    data = vehicle.to_dict()
+    data["sensors"]["ground_speed"] *= factor
+    return Vehicle.from_dict(data)
+
+
+def with_ballast(vehicle: Vehicle, share: float) -> Vehicle:
+    """The vehicle with a share of its first driven axle's mass on the next one."""
+    data = vehicle.to_dict()
+    first, second, *_ = [data["axles"][name] for name, axle in vehicle.axles.items() if axle.driven]
+    moved = share * first["mass"]
+    first["mass"] -= moved
+    second["mass"] += moved
     return Vehicle.from_dict(data)
 
 
