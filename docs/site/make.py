@@ -77,6 +77,7 @@ CONTENTS: dict[str, list[str]] = {
         "warning",
         "warning-history",
         "real-logs",
+        "real-logs-history",
         "benchmarks",
     ],
     "Inside": [
