@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 PAGES = (
     ("is a guess from the vehicle's size", "vehicle#noise-of-the-sensors"),
-    ("times what the vehicle file states, as of", "vehicle#noise-of-the-sensors"),
+    ("times what the vehicle file states", "vehicle#noise-of-the-sensors"),
     ("where a machine of its mass and wheels has", "vehicle#all-keys"),
     ("is taken as measured at the antenna", "vehicle#where-the-ground-speed-is-measured"),
     ("the vehicle's own lag is", "formats#two-sources-of-one-drive"),

@@ -292,3 +292,31 @@ def test_seconds_and_nanoseconds_in_two_columns_are_one_time(tmp_path: Path, nam
     wrong = {**yaml.safe_load(found.profile), "time": {"from": names[0], "nanoseconds": "gone"}}
     with pytest.raises(InputError, match=r"column gone.*is missing"):
         read(tmp_path / "log.csv", Profile.from_dict(wrong))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "rest", "unit", "reason"),
+    [
+        (1.0, 1e-3, "s", "it is in microseconds, it seems"),
+        (1.0, 5.0, "s", "are not whole seconds and a part of one"),
+        (0.5, 1.0, "s", "are not whole seconds and a part of one"),
+        (1e3, 1.0, "ms", "works with whole seconds only"),
+    ],
+)
+def test_what_are_no_nanoseconds_of_whole_seconds_is_refused(
+    tmp_path: Path, seconds: float, rest: float, unit: str, reason: str
+) -> None:
+    """A log of 30 s came to 29 s with jumps, or to .03, without a word."""
+    stamps = np.arange(0, 30_000_000_000, 50_000_000)
+    columns = {
+        "s": seconds * (stamps // 10**9),
+        "ns": rest * (stamps % 10**9),
+        "ground_speed": 1.0 + stamps / 3e10,
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    entry = {"from": "s", "nanoseconds": "ns", "unit": unit}
+    with pytest.raises(InputError, match=reason):
+        read(
+            tmp_path / "log.csv",
+            Profile.from_dict({"time": entry, "channels": {"ground_speed": "ground_speed"}}),
+        )

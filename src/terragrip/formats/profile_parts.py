@@ -166,6 +166,12 @@ class TimeSource(Part):
         unit_factor(value, "s")
         return value
 
+    @model_validator(mode="after")
+    def _whole_seconds(self) -> Self:
+        if self.nanoseconds is not None and unit_factor(self.unit, "s") != 1.0:
+            raise Fault("works with whole seconds only", "leave 'unit:' out, or it", ("nanoseconds",))
+        return self
+
 
 _COMMANDED = re.compile(r"(?<![a-z])(cmd|command(s|ed)?|set_?point|desired|target)(?![a-z])", re.IGNORECASE)
 

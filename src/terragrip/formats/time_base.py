@@ -26,13 +26,28 @@ from terragrip.units import factor_to
 
 
 def with_nanoseconds(column: str, nanoseconds: str | None, log: LogTable) -> LogTable:
-    """A log whose stamps in ``column``, whole seconds, have the ``nanoseconds`` beside them added; raises InputError without these."""
+    """A log whose stamps in ``column``, whole seconds, have the ``nanoseconds`` beside them added; raises InputError without these, or
+    where they are no part of a second."""
     if nanoseconds is None:
         return log
     if nanoseconds not in log.columns:
         hint = "correct 'nanoseconds:' of the profile's time"
         raise InputError("is missing", file=log.source, place=f"column {nanoseconds}", hint=hint)
     whole, rest = (numbers(n, log.columns[n], None, log.source) for n in (column, nanoseconds))
+    wrong = np.flatnonzero((rest < 0) | (rest > 1e9) | (whole != np.floor(whole)) & np.isfinite(whole))
+    if len(wrong):
+        problem = (
+            f"{whole[wrong[0]]:.10g} s and {rest[wrong[0]]:.10g} ns are not whole seconds and a part of one"
+        )
+        hint = "leave 'nanoseconds:' out of the profile where the stamps are whole without it, or correct the row"
+        raise InputError(
+            problem, file=log.source, place=f"column {nanoseconds}, row {wrong[0] + 1}", hint=hint
+        )
+    seconds = len(np.unique(whole))
+    if 2 <= seconds <= 0.5 * len(whole) and 0 < np.nanmax(rest, initial=0.0) < 1e6:
+        problem = "has all stamps in the first thousandth of their seconds: it is in microseconds, it seems"
+        hint = "add both to one column of seconds, and name that in the profile"
+        raise InputError(problem, file=log.source, place=f"column {nanoseconds}", hint=hint)
     return replace(log, columns={**log.columns, column: whole + 1e-9 * rest})
 
 
