@@ -130,7 +130,7 @@ def _notes(rim: Rim, zero: Zero | None, learns: bool) -> list[str]:
     if (
         rim.has_radius
         and abs(zero.ratio * base / _OF_KMH - 1) < _NEARLY
-        and abs(zero.ratio - 1) > 2 * rim.spread
+        and abs(zero.ratio - 1) > max(2 * rim.spread, zero.std)
     ):
         # nearly the file's: no other check can tell them apart
         scale = f"'scale: {_OF_KMH / base:.5g}, unit: rad/s'"
