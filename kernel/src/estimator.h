@@ -38,6 +38,7 @@ typedef struct { /* one row, calibrated and checked, in the vehicle's own direct
     tg_real chatter[8]; /* variance of the wheel's speed by what alternates from sample to sample, see inputs.c */
     tg_real ground_variance;
     tg_real turn_variance; /* of the ground speed, by what a turn adds to it at its receiver */
+    tg_real loud;          /* and by what its noise lately is beyond the one that is set, see loudness.c */
     tg_real doubt[TG_GROUND_SPEED + 1]; /* by place in a sample: variance beside the sensor's, of a spike */
     tg_real channel_nis[TG_MAX_CHANNELS]; /* NaN: no update took the channel as measured */
 } tg_row;
@@ -182,6 +183,7 @@ struct tg_estimator {
     tgi_warped warped;
     tgi_hidden hidden;
     tgi_slow_speed slow_speed;
+    tgi_loudness loudness;
     double ground_time;        /* of the last measured ground speed */
     tg_real shock;             /* variance of the accelerometer about the model, (m/s^2)^2 */
     tg_input held;             /* inputs of the last row, along the travel */
@@ -288,6 +290,9 @@ void tgi_warp(const tgi_constants *restrict c, const tg_real *restrict value, tg
 void tgi_watch_warp(tg_estimator *e, int32_t flowing, tg_real fresh);
 void tgi_watch_slips(tg_estimator *e, const tgi_slips *slips, int32_t flowing, tg_real travelled);
 tg_real tgi_lasting_warp(const tg_estimator *e, tg_real *warp);
+
+/* loudness.c */
+tg_real tgi_loudness_of(tg_estimator *e, const tg_row *row, tg_real rim);
 
 /* slow_speed.c */
 void tgi_rest_reading(tg_estimator *e, const tg_row *row);

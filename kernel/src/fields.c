@@ -99,7 +99,7 @@ const tgi_field tgi_estimator_fields[] = {
     HOLDS(axle_load), HOLDS(mass), HOLDS(hitch_load), HOLDS(wheel), HOLDS(ground), HOLDS(forward), HOLDS(turn), INSIDE(T, own_time, tgi_own_time, own_time), INTEGERS(T, rolls, 0, 255), INTEGERS(T, shared, 0, 8), INTEGERS(T, locked, 0, 8), INTEGERS(T, unseen, 0, 3),
     FLAG(T, braked), FLAG(T, pressed), REALS(T, unbraked), DOUBLES(T, unbraked_time), DOUBLES(T, braked_time),
     REALS(T, yaw_rate), DOUBLES(T, yaw_time), REALS(T, unseen_turn), DOUBLES(T, leap_time), INSIDE(T, settling, tgi_settling, settling),
-    LOWPASS(acceleration), LOWPASS(lateral), LOWPASS(roll), LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed),
+    LOWPASS(acceleration), LOWPASS(lateral), LOWPASS(roll), LOWPASS(balance), REALS(T, slip_memory), INSIDE(T, slope, tgi_slope, slope), REALS(T, roughness), REALS(T, warped), REALS(T, hidden), REALS(T, slow_speed), REALS(T, loudness),
     DOUBLES(T, ground_time), REALS(T, shock),
     REALS(T, held), INSIDE(T, belief, tg_belief, belief), INSIDE(T, algebra, tg_algebra, algebra), INSIDE(T, watch, tgi_watch, watch),
     REALS(T, scene), REALS(T, curve), REALS(T, wheel_curve), REALS(T, curve_std), REALS(T, wheel_curve_std), REALS(T, curve_wait),

@@ -45,7 +45,7 @@ static tg_real in_time(tg_real deviation, const tgi_scene *scene, tg_real turn, 
 static void see_newest(const tg_estimator *e, const tg_row *row, tgi_view *l)
 {
     const tg_real rim = tgi_max(l->fastest, e->settings.standstill_speed), pace = TG_SHORT * e->constants.pace, interval = e->ground.interval;
-    const tg_real variance = (e->constants.variance[TG_GROUND_SPEED] + row->doubt[TG_GROUND_SPEED]) / tgi_square(rim);
+    const tg_real variance = (e->constants.variance[TG_GROUND_SPEED] + row->doubt[TG_GROUND_SPEED] + row->loud) / tgi_square(rim);
     const tg_real beyond = (l->travel - (tg_real)e->direction * row->value[TG_GROUND_SPEED]) / rim;
     if (tgi_weight(e->settings.tuning.huber, beyond, tgi_square(l->deviation) + variance) < 1) return;
     l->slip += beyond;

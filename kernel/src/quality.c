@@ -141,6 +141,7 @@ tg_status tgi_clean(tg_estimator *e, const tg_sample *sample, tg_row *row)
     row->outlier = outlier;
     row->measured = measured;
     row->reckoned = 0;
+    row->loud = 0;
     row->steady_wheels = 0;
     for (int32_t k = 0; k < TG_MAX_CHANNELS; k++) row->channel_nis[k] = (tg_real)NAN;
     memset(row->doubt, 0, sizeof row->doubt); /* until tgi_doubt_speeds, which not every method calls */

@@ -185,7 +185,10 @@ static int32_t is_missing(tg_estimator *e, const tg_row *row, tg_real dt, tg_rea
 void tgi_reckon(tg_estimator *e, const tg_drive *drive, tg_real dt, int32_t goes, tg_row *row, tg_real *q)
 {
     const tg_tuned *const k = &e->settings.tuned;
+    tg_real pulled;
     row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->doubt[TG_GROUND_SPEED];
+    row->loud = tgi_loudness_of(e, row, means(e, row, drive, &pulled).mean);
+    row->ground_variance += row->loud;
     if (e->standing) e->slip_memory.astray = e->scene.astray = 0;
     if (!is_missing(e, row, dt, k->silence)) return;
     e->scene.astray = 0;
@@ -230,7 +233,8 @@ static rims rims_of_speeds(const tg_estimator *e, const tg_row *row)
  * vehicle that stands has no speed. */
 void tgi_reckon_speeds(tg_estimator *e, tg_real dt, tg_row *row)
 {
-    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance;
+    row->loud = tgi_loudness_of(e, row, rims_of_speeds(e, row).mean);
+    row->ground_variance = e->constants.variance[TG_GROUND_SPEED] + row->turn_variance + row->loud;
     const tg_real usual = 2 * e->ground.interval, most = e->settings.gap, silence = tgi_max(e->settings.tuned.silence, usual < most ? usual : most);
     if (!is_missing(e, row, dt, silence) || e->speeds.seen[0] == 0 || e->speeds.open != 0) return;
     tg_real variance = tgi_square(e->settings.standstill_speed), speed = 0;

@@ -77,6 +77,12 @@ typedef struct { /* loads from slips, see hidden.c */
     tg_real load;                 /* relative variance of adhesion by load beyond what adhesions show; may be less than 0 */
 } tgi_hidden;
 
+typedef struct { /* white noise of the ground speed lately, see loudness.c */
+    tg_real speed[3], gap[3], step[2]; /* m/s: along the travel in its last samples, newest first, and less the rims'; s between them */
+    tg_real power;           /* mean square of their third differences */
+    tg_real count;           /* samples in a row, up to 3 */
+} tgi_loudness;
+
 typedef struct { /* errors of the ground speed that last, see slow_speed.c */
     tg_real mean, count;    /* of this stop's readings */
     tg_real squares, stops; /* of all stops, weighted */

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terragrip.recording.held import quantum
+from terragrip.recording.held import measurable, quantum
 from terragrip.recording.lag import measured, wheels_of
 from terragrip.recording.noise import rounding_noise, white_noise
 
@@ -27,6 +27,7 @@ def understated_noise(recording: Recording, vehicle: Vehicle) -> float | None:
     `white_noise` shows up to one step, however quiet the sensor is.
     """
     stated, ground = vehicle.sensors.ground_speed, recording.channels.get("ground_speed")
+    ground = None if ground is None else measurable(ground)
     own = None if stated is None or "ground_speed" in recording.noise else measured(recording.time, ground)
     if own is None or ground is None or stated is None:
         return None
