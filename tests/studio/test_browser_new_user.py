@@ -155,11 +155,11 @@ def who_comes_back_finds_what_follows(page: Any, served: Served, folder: Path) -
     replace(table, columns=kept).write(folder / "day1-estimates.parquet")
     page.reload()  # of slip alone: two buttons led to jobs that must fail
     page.wait_for_selector("#no-adhesion")
-    assert not page.query_selector("#next-soils, #next-ground")
+    page.wait_for_function("() => !document.querySelector('#next-soils, #next-ground')")
     (folder / "day1-estimates.parquet").unlink()
     page.reload()
     page.wait_for_selector("text=ready to estimate")
-    assert not page.query_selector("#next-soils")
+    page.wait_for_function("() => !document.querySelector('#next-soils')")
 
 
 def test_a_columns_choice_unit_and_sign_reach_the_profile(

@@ -100,7 +100,7 @@ export class LogPage {
     this.read[0] = this.version(this.log);
     let last: Job | undefined; // estimate of this log: with its vehicle and profile one goes on
     for (const job of (await tried(() => get<Job[]>("jobs"))) ?? []) {
-      if (this.items.some((item) => item.path === job.output) && this.keep(job) && job.kind === "estimate") last = job;
+      if (this.keep(job) && job.kind === "estimate") last = job;
     }
     const used = (option: string): string => (last?.words.includes(option) ? (last.words[last.words.indexOf(option) + 1] ?? "") : "");
     this.jobs.draw();
@@ -327,7 +327,7 @@ export class LogPage {
   private async offerNext(): Promise<void> {
     const path = this.estimates;
     const about = path ? await tried(() => get<Run>("drive", { path })) : undefined;
-    this.hasAdhesion = about?.columns.some((name) => name.startsWith("adhesion_")) ?? true;
+    this.hasAdhesion = about?.columns.some((name) => name.startsWith("adhesion_")) ?? this.hasAdhesion; // a request that failed says nothing
     onceReleased(this.next, () => this.drawNext());
   }
 
@@ -369,9 +369,9 @@ export class LogPage {
     return words.includes(this.log) || words.includes(this.estimates);
   }
 
-  /** What a job made of this log, now or before the page was opened; false where it made nothing of it. */
+  /** What a job made of this log, now or before the page was opened; false where it made nothing of it that is still there. */
   private keep(job: Job): boolean {
-    if (job.state !== "done") return false;
+    if (job.state !== "done" || !this.items.some((item) => item.path === job.output)) return false;
     if (job.kind === "estimate" && job.title === this.log) {
       this.estimates = job.output;
       this.made.clear(); // of the estimates before, perhaps by another vehicle
